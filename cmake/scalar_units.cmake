@@ -6,8 +6,7 @@ function(loopbench_add_scalar_units result name prologue)
   foreach(group
     "drives forces joint kinematics mechanism time_function self_stress \
  body_equations tree_dynamics odca sweep"
-    "coupled_solver factored_state level* passage system* null_space dense_reduction dense_equations \
-lagrange"
+    "factored_state level* system* dense_reduction lagrange"
     "factors"
     "loop_solver direction_weights singular_values symmetric_eigen partition")
     separate_arguments(patterns UNIX_COMMAND "${group}")

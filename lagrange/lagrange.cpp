@@ -4,6 +4,7 @@
 
 #include "mechanism/algebra/dense_memory.h"
 #include "mechanism/algebra/instantiate.h"
+#include "mechanism/loops/self_stress.h"
 
 namespace loopbench::lagrange {
 
@@ -24,7 +25,10 @@ bool IsLessWork(const JointResponse<Space>& sparse, const Mechanism<Space, doubl
 template <class Space, class S>
 Lagrange<Space, S>::Lagrange(const Mechanism<Space, S>& mechanism,
                              const FormulationOptions& options)
-    : mechanism_(mechanism), equations_(mechanism), change_(VectorX<S>::Zero(mechanism.num_u())) {
+    : mechanism_(mechanism),
+      equations_(mechanism),
+      change_(VectorX<S>::Zero(mechanism.num_u())),
+      lambda_change_(VectorX<S>::Zero(mechanism.num_rows())) {
   if constexpr (std::is_same_v<S, double>) {
     if (options.solver == SolverKind::kRankRevealing && !options.general) {
       joints_ = JointResponse<Space>::Make(mechanism, kMaxOfResponse);
@@ -72,9 +76,16 @@ std::string Lagrange<Space, S>::WhySingular() const {
 }
 
 template <class Space, class S>
-void Lagrange<Space, S>::SolveSparsely(VectorX<S>& x, VectorX<S>* lambda) {
+void Lagrange<Space, S>::SolveEquations() {
   if constexpr (std::is_same_v<S, double>) {
     joints_->Solve(equations_.b(), equations_.c0(), equations_.A());
+  }
+}
+
+template <class Space, class S>
+void Lagrange<Space, S>::SolveSparsely(VectorX<S>& x, VectorX<S>* lambda) {
+  if constexpr (std::is_same_v<S, double>) {
+    SolveEquations();
     equations_.Read(*kinematics_, x);
     if (lambda != nullptr) equations_.Read(joints_->phi(), *lambda);
   }
@@ -96,6 +107,29 @@ bool Lagrange<Space, S>::Accelerate(const Kinematics<Space, S>& kinematics,
   equations_.SetState(kinematics, feedback);
   SolveSparsely(udot, lambda);
   return true;
+}
+
+template <class Space, class S>
+bool Lagrange<Space, S>::AccelerateWithShare(const Kinematics<Space, S>& kinematics,
+                                             const VectorX<S>& feedback,
+                                             SelfStress<Space, S>& stress, VectorX<S>& udot,
+                                             VectorX<S>* lambda) {
+  if constexpr (std::is_same_v<S, double>) {
+    if (!is_sparse_) return false;
+    equations_.SetState(kinematics, feedback);
+    SolveEquations();
+    if (lambda != nullptr) equations_.Read(joints_->phi(), *lambda);
+    equations_.SetMore(stress.ShareOfAccelerations(kinematics, equations_.A()));
+    SolveEquations();
+    equations_.AddLast();
+    equations_.Read(kinematics, udot);
+    if (lambda == nullptr) return true;
+    lambda_change_ = *lambda;
+    equations_.Read(joints_->phi(), *lambda);
+    *lambda += lambda_change_;
+    return true;
+  }
+  return false;
 }
 
 template <class Space, class S>

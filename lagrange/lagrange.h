@@ -26,6 +26,9 @@ class Lagrange final : public ConstraintSolver<Space, S> {
              VectorX<S>* lambda) override;
   bool Accelerate(const Kinematics<Space, S>& kinematics, const VectorX<S>& feedback,
                   VectorX<S>& udot, VectorX<S>* lambda) override;
+  bool AccelerateWithShare(const Kinematics<Space, S>& kinematics, const VectorX<S>& feedback,
+                           SelfStress<Space, S>& stress, VectorX<S>& udot,
+                           VectorX<S>* lambda) override;
   bool CompleteSpeeds(Kinematics<Space, S>& kinematics, VectorX<S>& u) override;
 
   std::string WhySingular() const override;
@@ -34,7 +37,8 @@ class Lagrange final : public ConstraintSolver<Space, S> {
   bool is_sparse() const { return is_sparse_; }
 
  private:
-  /// The equations as they are set.
+  /// Solves the equations as they are set.
+  void SolveEquations();
   void SolveSparsely(VectorX<S>& x, VectorX<S>* lambda);
 
   const Mechanism<Space, S>& mechanism_;
@@ -43,7 +47,7 @@ class Lagrange final : public ConstraintSolver<Space, S> {
   BodyEquations<Space, S> equations_;
   const Kinematics<Space, S>* kinematics_ = nullptr;  ///< of the last Factor()
   bool is_sparse_ = false;
-  VectorX<S> change_;
+  VectorX<S> change_, lambda_change_;
 };
 
 }  // namespace loopbench::lagrange

@@ -34,7 +34,7 @@ Matrix6 ShiftTo(const Side& side) {
 
 template <int k>
 void SetResponse(const Matrix6& Z11, const Matrix6& Z12, const Matrix6& Z22,
-                 Response<double, k>& response) {
+                 Response<double, kRows, k>& response) {
   for (int i = 0; i < k; ++i) {
     for (int j = 0; j <= i; ++j) response.zeta22(i, j) = Z22(i, j);
     for (int j = 0; j < kRows; ++j) response.zeta12[j][i] = Z12(j, i);

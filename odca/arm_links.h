@@ -1,10 +1,10 @@
-// Arms of a spatial mechanism (arm_sweep.cpp), and their bodies as the links of revolute_handles.h.
+// Arms of a spatial mechanism (arm_sweep.cpp), and their bodies as the links of revolutes.h.
 #pragma once
 
 #include <vector>
 
 #include "mechanism/model/mechanism.h"
-#include "odca/revolute_handles.h"
+#include "odca/revolutes.h"
 
 namespace loopbench::odca::arms {
 
@@ -17,7 +17,7 @@ struct ArmBody {
 
 /// The last body of an arm that a cut joint holds: all of the motion of handle 2.
 struct ArmTip {
-  Response<double, kAll> response;
+  Response<double, kRows, kAll> response;
   double about12[kAll];  ///< as of Link, for all forces on handle 2
 };
 

@@ -1,5 +1,5 @@
 // O-DCA for spatial mechanisms whose bodies form arms of revolute joints under gravity: computes
-// rates directly from joint coordinates and speeds, in the kernels of revolute_handles.h.
+// rates directly from joint coordinates and speeds, in the kernels of revolutes.h.
 //
 // An arm is a sequence of bodies that hangs from Ground by joints of the spanning tree. Its last
 // body is free, or a cut joint connects it to another arm's last body or to Ground: an open path is
@@ -147,8 +147,7 @@ class Closing {
     Factor(X, slack);
     const Acceleration<Spatial, double> missing = Missing<kUnknowns>(P, Q);
     for (int a = 0; a < n; ++a) phi[a] = joint_.D(a).dot(missing);
-    X.Forward(phi);
-    X.Backward(phi);
+    X.Solve(phi);
     auto force = Direction<Spatial, double>::Zero();
     for (int a = 0; a < n; ++a) force += joint_.D(a) * phi[a];  // (13)
     from_Q_.Back(force, Q.F2);
@@ -156,8 +155,7 @@ class Closing {
     for (int a = 0; a < n; ++a) {
       double column[n];
       for (int b = 0; b < n; ++b) column[b] = b < a ? X_alone(a, b) : X_alone(b, a);
-      X.Forward(column);
-      X.Backward(column);
+      X.Solve(column);
       trace += column[a];
     }
     return Min(slack, 1.0 - limit_ * trace);
@@ -201,16 +199,10 @@ void SetRise(const GroundSide& ground, double* zeta23) {
 }
 
 struct ArmKind {
+  static constexpr int kRows = arms::kRows;
+  static constexpr bool kBeginsFree = false;
   template <class T>
   using Link = arms::Link<T>;
-  template <class T>
-  using Force = arms::Force<T>;
-  template <class T>
-  using Assembly = Piece<T>;
-  template <class T>
-  using Cut = arms::Cut<T>;
-  template <class T>
-  using EndCut = arms::EndCut<T>;
 
   template <class T>
   struct OfChain : ChainNodes {
@@ -247,7 +239,7 @@ class ArmSweep final : public ChainSweep<ArmSweep, ArmKind, Spatial, double> {
     ArmTip constants;
     GroundSide ground;  ///< as of Arm
     Free<double> free;
-    arms::EndCut<double, kAll> cut;
+    EndCut<double, kRows, kAll> cut;
     ClosingSide side;
   };
   struct PlacedClosing {
@@ -418,13 +410,13 @@ class ArmSweep final : public ChainSweep<ArmSweep, ArmKind, Spatial, double> {
   }
 
   // steps of ChainSweep
-  Passage<Lanes> Begin(const Group& group) const {
+  Passage<Lanes> MotionBefore(const Group& group) const {
     Passage<Lanes> along;  // of which only w is followed
     along.w = group.w;
     return along;
   }
   template <Unknowns kUnknowns>
-  LOOPBENCH_INLINE Free<Lanes> FreeOf(int pack, Passage<Lanes>& along) {
+  LOOPBENCH_INLINE Free<Lanes> FreeOfPack(int pack, Passage<Lanes>& along) {
     const Shape<Lanes>& shape = packs_[pack].shape;
     const Lanes speed = Load<Lanes>(&speed_[pack * kLanes]);
     const auto w = Pass<Follow::kSpeeds>(shape, turns(pack * kLanes), speed, along);
@@ -435,41 +427,28 @@ class ArmSweep final : public ChainSweep<ArmSweep, ArmKind, Spatial, double> {
     return free;
   }
   template <Unknowns kUnknowns>
-  Piece<Lanes>& First(Group& group, Passage<Lanes>& along) {
-    const Free<Lanes> free = FreeOf<kUnknowns>(group.pack, along);
-    group.assemblies.response = packs_[group.pack].response;
-    std::copy_n(free.zeta13, kRows, group.assemblies.zeta13);
-    std::copy_n(free.zeta23, kRows, group.assemblies.zeta23);
-    return group.assemblies;
+  const Free<double>& FreeOfSingle(int single) const {
+    return free_[single];
+  }
+  const auto& ResponseOfPack(int pack) const { return packs_[pack].response; }
+  const auto& ResponseOfSingle(int single) const { return singles_[single].response; }
+  void TurnToNext(int place, OneHandle<double, kRows>& all) const { TurnHandle(turn(place), all); }
+  LOOPBENCH_INLINE void TurnToNext(int place, TwoHandle<Lanes, kRows>& all) const {
+    TurnHandle(turns(place), all);
   }
   template <Unknowns kUnknowns>
-  void Next(int pack, Passage<Lanes>& along, Piece<Lanes>& all, Lanes& slack) {
-    const Free<Lanes> free = FreeOf<kUnknowns>(pack, along);
-    Join(all, turns(pack * kLanes), packs_[pack].response, free, cuts_[pack], slack);
-  }
-  template <Unknowns kUnknowns>
-  OneHandle<double> Start(const Chain& arm) const {
-    OneHandle<double> ground = {};
+  OneHandle<double, kRows> Start(const Chain& arm) const {
+    OneHandle<double, kRows> ground = {};
     if (kUnknowns == Unknowns::kAccelerations) std::ranges::copy(arm.ground, ground.zeta23);
     return ground;
   }
-  void AttachPiece(int piece, bool /*is_first*/, OneHandle<double>& all, double& slack) {
-    const Piece<double> next = LaneOf(group_of(piece).assemblies, lane_of(piece));
-    all = Join(all, turn(place_of_piece(piece)), next.response, next.zeta13, next.zeta23,
-               end_cuts_[piece], slack);
-  }
   template <Unknowns kUnknowns>
-  void AttachSingle(int single, bool /*is_first*/, OneHandle<double>& all, double& slack) {
-    const Free<double>& free = free_[single];
-    all = Join(all, turn(packed_ + single), singles_[single].response, free.zeta13, free.zeta23,
-               end_cuts_[num_pieces_ + single], slack);
-  }
-  template <Unknowns kUnknowns>
-  double End(const Chain& arm, const OneHandle<double>& all, double slack) {
+  double End(const Chain& arm, OneHandle<double, kRows>& all, double slack) {
     if (arm.tip < 0) return slack;
     TipState& tip = tips_[arm.tip];
-    tip.side.assembly = Join(all, turn(place_of_tip(arm.tip)), tip.constants.response,
-                             tip.free.zeta13, tip.free.zeta23, tip.cut, slack);
+    TurnToNext(place_of_tip(arm.tip), all);
+    tip.side.assembly = JoinSeries(all, tip.constants.response, tip.free.zeta13, tip.free.zeta23,
+                                   0.0, tip.cut, slack);
     return slack;
   }
   template <Unknowns kUnknowns>
@@ -485,20 +464,10 @@ class ArmSweep final : public ChainSweep<ArmSweep, ArmKind, Spatial, double> {
     const TipState& tip = tips_[arm.tip];
     const int place = place_of_tip(arm.tip);
     Force<double> F1;
-    arms::ForceIn(tip.cut, tip.side.F2, F1.at);
+    ForceIn(tip.cut, tip.side.F2, F1.at);
     rate_[place] =
         About(tip.free.zeta13[kRows], tip.link.about11, tip.constants.about12, F1.at, tip.side.F2);
     return Opposite(place, F1);
-  }
-  Force<double> ForceIn(int node, bool /*is_first*/, const Force<double>& F2) const {
-    Force<double> F1;
-    arms::ForceIn(end_cuts_[node], F2.at, F1.at);
-    return F1;
-  }
-  Force<Lanes> ForceIn(int pack, const Force<Lanes>& F1, const Force<Lanes>& F2) const {
-    Force<Lanes> force;
-    arms::ForceIn(cuts_[pack], packs_[pack].response.zeta12, F1.at, F2.at, force.at);
-    return force;
   }
   template <Unknowns kUnknowns>
   void RespondSingle(int single, const Force<double>& F1, const Force<double>& F2) {
@@ -519,14 +488,14 @@ class ArmSweep final : public ChainSweep<ArmSweep, ArmKind, Spatial, double> {
     }
     Store(About(about1_[pack], link.about11, link.about12, F1.at, F2.at), rates);
   }
-  Force<double> Opposite(int place, const Force<double>& F1) const {
-    Force<double> F2;
-    OppositeBefore(turn(place), F1.at, F2.at);
-    return F2;
-  }
-  Force<Lanes> Opposite(int place, const Force<Lanes>& F1) const {
-    Force<Lanes> F2;
-    OppositeBefore(turns(place), F1.at, F2.at);
+  template <class U>
+  Force<U> Opposite(int place, const Force<U>& F1) const {
+    Force<U> F2;
+    if constexpr (std::is_same_v<U, double>) {
+      OppositeBefore(turn(place), F1.at, F2.at);
+    } else {
+      OppositeBefore(turns(place), F1.at, F2.at);
+    }
     return F2;
   }
 
@@ -546,14 +515,15 @@ class ArmSweep final : public ChainSweep<ArmSweep, ArmKind, Spatial, double> {
 
   /// As in the general sweep, without kinematics and zeta_i3.
   long OperationsOfSweep() const {
-    constexpr int kBoth = 2 * Operations::About(kRows) + Operations::kOpposite;
-    constexpr int kInner = Operations::kJoin + Operations::kForceIn + kBoth;
-    constexpr int kNode = Operations::EndJoin(kRows) + Operations::ForceInEnd(kRows);
-    constexpr int kTip = Operations::EndJoin(kAll) + Operations::ForceInEnd(kAll) +
-                         Operations::About(kAll) + Operations::kOpposite;
+    using Work = Operations<kRows>;
+    constexpr int kBoth = 2 * AboutWork(kRows) + kOppositeWork;
+    constexpr int kInner = kTurnTwoWork + Work::kJoin + Work::kForceIn + kBoth;
+    constexpr int kNode = kTurnOneWork + Work::EndJoin(kRows) + Work::ForceInEnd(kRows) + kBoth;
+    constexpr int kTip = kTurnOneWork + Work::EndJoin(kAll) + Work::ForceInEnd(kAll) +
+                         AboutWork(kAll) + kOppositeWork;
     const long singles = static_cast<long>(singles_.size()), tips = static_cast<long>(tips_.size());
-    return (packed_ - num_pieces_) * static_cast<long>(kInner) +
-           num_pieces_ * static_cast<long>(kNode + kBoth) + singles * (kNode + kBoth) + tips * kTip;
+    return (packed_ - num_pieces_) * static_cast<long>(kInner) + (num_pieces_ + singles) * kNode +
+           tips * kTip;
   }
 
   int place_of_tip(int tip) const { return packed_ + static_cast<int>(singles_.size()) + tip; }

@@ -7,7 +7,7 @@
 //   up, matrices                  zeta of each body, then X, W and zeta of each join
 //   up and down, vectors          zeta_i3, then forces: once, or twice where speeds are completed
 //
-// Handles are those of two_handle.h; a body has as many as pins. A tree pin on Ground is a property
+// Handles are those of pins.h; a body has as many as pins. A tree pin on Ground is a property
 // of its body, not a joint of an assembly. A join factors X = L D L^T, two rows of one pin at a
 // time. It keeps L and W = D^-1 L^-1 Y. The rank of a pin that closes a loop is uncertain under the
 // condition for paths: then the general sweep decides.
@@ -23,9 +23,6 @@
 #include "odca/path_links.h"
 #include "odca/tree_angles.h"
 
-/// Behind the parameters of a lambda: its captures must not go through memory.
-#define LOOPBENCH_INLINED __attribute__((always_inline))
-
 namespace loopbench::odca::pins {
 
 namespace {
@@ -34,6 +31,15 @@ namespace {
 bool HoldsBody(const Joint<Planar, double>& joint) {
   return joint.in_tree() && (joint.from == kGround || joint.to == kGround);
 }
+
+/// [xx xy; yx yy].
+struct Matrix2 {
+  double xx, xy, yx, yy;
+
+  friend Matrix2 operator-(const Matrix2& A, const Matrix2& B) {
+    return {A.xx - B.xx, A.xy - B.xy, A.yx - B.yx, A.yy - B.yy};
+  }
+};
 
 /// A moment of F about the point that the arm leads from.
 double Moment(const Vector2<double>& arm, const Vector2<double>& F) {
@@ -79,7 +85,7 @@ class AssemblySweep final : public ShortCut<Planar> {
 
  private:
   using Vector = Vector2<double>;
-  using Matrix = Matrix2<double>;
+  using Matrix = Matrix2;
 
   struct Body {
     int index = 0;      ///< of the mechanism's bodies
@@ -104,7 +110,7 @@ class AssemblySweep final : public ShortCut<Planar> {
     int P = -1, Q = -1;            ///< handles
     int body_P = -1, body_Q = -1;  ///< -1: Ground
     Vector ground = {};            ///< the point there
-    Vector v = {};                 ///< relative velocity (two_handle.h), Q against P, or the gap
+    Vector v = {};                 ///< relative velocity (pins.h), Q against P, or the gap
     double w_P = 0.0;
   };
   /// One of a node's joints on one of its children.
@@ -206,7 +212,7 @@ class AssemblySweep final : public ShortCut<Planar> {
     return true;
   }
 
-  /// A cut joint is imposed at a point of Q; there the arm of P ends (two_handle.h).
+  /// A cut joint is imposed at a point of Q; there the arm of P ends (pins.h).
   template <bool kOfSpeeds>
   void Close() {
     const auto leads = [&](int body, int handle) {
@@ -267,21 +273,28 @@ class AssemblySweep final : public ShortCut<Planar> {
     return Y;
   }
 
-  /// X = Y C^T of one pin (16). Both sides may be on one assembly.
-  LOOPBENCH_INLINE Symmetric2<double> Across(const Node& node, const Pin& pin) const {
+  /// X = Y C^T of one pin (16), its lower triangle. Both sides may be on one assembly.
+  LOOPBENCH_INLINE Factors<double, kRows> Across(const Node& node, const Pin& pin) const {
     const auto block = [&](const Side& row, const Side& column) -> const Matrix& {
       const int child = row.child;
       return zeta_[node.blocks[child] + row.place + node.handles[child] * column.place];
     };
-    Symmetric2<double> X = {0.0, 0.0, 0.0};
+    double xx = 0.0, xy = 0.0, yy = 0.0;
+    const auto add = [&](double x, double mixed, double y) LOOPBENCH_INLINED {
+      xx += x;
+      xy += mixed;
+      yy += y;
+    };
     for (const Side* side : {&pin.Q, &pin.P}) {
       if (side->place < 0) continue;
       const Matrix& own = block(*side, *side);
-      X = X + Symmetric2<double>{own.xx, own.xy, own.yy};
+      add(own.xx, own.xy, own.yy);
     }
-    if (pin.P.place < 0 || pin.Q.place < 0 || pin.P.child != pin.Q.child) return X;
-    const Matrix& QP = block(pin.Q, pin.P);
-    return X + Symmetric2<double>{-(QP.xx + QP.xx), -(QP.xy + QP.yx), -(QP.yy + QP.yy)};
+    if (pin.P.place >= 0 && pin.Q.place >= 0 && pin.P.child == pin.Q.child) {
+      const Matrix& QP = block(pin.Q, pin.P);
+      add(-(QP.xx + QP.xx), -(QP.xy + QP.yx), -(QP.yy + QP.yy));
+    }
+    return {{xx, xy, yy}};
   }
 
   /// X = Y C^T (16, 66) is factored pin by pin. Rows of L are columns of W of the pins.
@@ -290,7 +303,7 @@ class AssemblySweep final : public ShortCut<Planar> {
     const int n = rows;
     const Pin* pins = pins_.data() + node.first_pin;
     const Side* kept = kept_.data() + node.first_kept;
-    Factored2<double>* factors = factors_.data() + node.first_pin;
+    Factors<double, kRows>* factors = factors_.data() + node.first_pin;
     double* W = W_.data() + node.matrix;
     const double* L = W + 2 * n * node.kept;
     // two columns of U and W in the rows of the first pins, from columns of X or Y
@@ -303,9 +316,10 @@ class AssemblySweep final : public ShortCut<Planar> {
         const auto column = [&](double* u, double* w, double x, double y) LOOPBENCH_INLINED {
           u[2 * i] = x - Dot(Lx, u, 2 * i);
           u[2 * i + 1] = y - Dot(Ly, u, 2 * i);
-          const Vector solved = factors[i].Solve(u[2 * i], u[2 * i + 1]);
-          w[2 * i] = solved.x;
-          w[2 * i + 1] = solved.y;
+          double solved[] = {u[2 * i], u[2 * i + 1]};
+          factors[i].Solve(solved);
+          w[2 * i] = solved[0];
+          w[2 * i + 1] = solved[1];
         };
         column(ux, wx, Y.xx, Y.yx);
         column(uy, wy, Y.xy, Y.yy);
@@ -320,12 +334,14 @@ class AssemblySweep final : public ShortCut<Planar> {
       });
       const double *Lx = L + 2 * n * i, *Ly = Lx + n;
       const double *ux = U + 2 * n * (node.kept + i), *uy = ux + n;
-      Symmetric2<double> rest = Across(node, pins[i]);
-      rest.xx -= Dot(Lx, ux, 2 * i);
-      rest.xy -= Dot(Ly, ux, 2 * i);
-      rest.yy -= Dot(Ly, uy, 2 * i);
-      factors[i] = FactorsOf(rest, pins[i].limit, slack);
-      if (!(slack >= 0.0) || !(rest.xx + rest.yy > 0.0)) return false;
+      Factors<double, kRows> X = Across(node, pins[i]);
+      X.L(0, 0) -= Dot(Lx, ux, 2 * i);
+      X.L(1, 0) -= Dot(Ly, ux, 2 * i);
+      X.L(1, 1) -= Dot(Ly, uy, 2 * i);
+      const double trace = X.L(0, 0) + X.L(1, 1);
+      Factor(X, pins[i].limit, slack);
+      if (!(slack >= 0.0) || !(trace > 0.0)) return false;
+      factors[i] = X;
     }
     for (int e = 0; e < node.kept; ++e) {
       reduce(e, n / 2,
@@ -355,7 +371,7 @@ class AssemblySweep final : public ShortCut<Planar> {
         if (e == f) {
           Z.yx = Z.xy;
         } else {
-          zeta[f + node.kept * e] = Transpose(Z);
+          zeta[f + node.kept * e] = {Z.xx, Z.yx, Z.xy, Z.yy};
         }
         zeta[e + node.kept * f] = Z;
       }
@@ -388,9 +404,10 @@ class AssemblySweep final : public ShortCut<Planar> {
       b = b - Vector{Dot(W, s, rows), Dot(W + n, s, rows)};  // (29-30, 72)
     }
     for (int i = 0; i < n / 2; ++i) {
-      const Vector solved = factors_[node.first_pin + i].Solve(s[2 * i], s[2 * i + 1]);
-      s[2 * i] = solved.x;
-      s[2 * i + 1] = solved.y;
+      double solved[] = {s[2 * i], s[2 * i + 1]};
+      factors_[node.first_pin + i].Solve(solved);
+      s[2 * i] = solved[0];
+      s[2 * i + 1] = solved[1];
     }
   }
 
@@ -480,9 +497,9 @@ class AssemblySweep final : public ShortCut<Planar> {
   /// Two columns for each handle that stays, then of L^T for each pin if there are several. A
   /// column has two numbers for each pin.
   std::vector<double> W_;
-  std::vector<Factored2<double>> factors_;  ///< D, by pin
-  std::vector<Vector> b_, F_;               ///< by handle: a join changes those that stay
-  std::vector<double> s_;                   ///< two for each pin; in the downward pass phi
+  std::vector<Factors<double, kRows>> factors_;  ///< D, by pin
+  std::vector<Vector> b_, F_;                    ///< by handle: a join changes those that stay
+  std::vector<double> s_;                        ///< two for each pin; in the downward pass phi
   TreeAngles<double> tree_;
   long of_matrices_ = 0, of_vectors_ = 0;
 };

@@ -22,7 +22,7 @@
 #include <type_traits>
 #include <vector>
 
-#include "odca/short_cut.h"
+#include "odca/handles.h"
 
 namespace loopbench::odca {
 
@@ -62,30 +62,36 @@ struct ChainNodes {
   bool operator==(const ChainNodes&) const = default;
 };
 
-/// Kind: types of its joints, and what else chains (OfChain) and groups (OfGroup) have. T =
+/// Kind: the rows (kRows) and links (Link) of its joints, and other members of chains (OfChain) and
+/// groups (OfGroup). kBeginsFree: chains begin with a body alone instead of a joint on Ground. T =
 /// Lanes has a mechanism per lane and hence no pieces. Own: the sweep, with
 ///
-///   Begin, First, Next    what is followed along pieces; their first bodies; joins the next ones
-///   Start, Attach, End    a chain without bodies; joins a node to it; its last joint
-///   Close                 joints between chains
-///   EndForce              on the last node of a chain, at its handle 2
-///   ForceIn               the force at handle 1 of a pack or a node, from that at handle 2
-///   Respond               rates of a pack or a single body, from both
-///   Opposite              the force on handle 2 of the bodies before
+///   MotionBefore               what is followed along pieces
+///   FreeOfPack, FreeOfSingle   zeta_i3 of bodies
+///   ResponseOfPack, ..Single   their zeta
+///   TurnToNext                 handle 2 of an assembly into the axes behind the next joint
+///   Start, End                 a chain without bodies; its last joint
+///   Close                      joints between chains
+///   EndForce                   on the last node of a chain, at its handle 2
+///   Respond, RespondSingle     rates of a pack or a single body, from both forces
+///   Opposite                   the force on handle 2 of the bodies before
 template <class Own, class Kind, class Space, class T>
 class ChainSweep : public ShortCut<Space, T> {
  protected:
   static constexpr bool kIsOne = std::is_same_v<T, double>;
   template <class U>
   using Link = typename Kind::template Link<U>;
+  static constexpr int kRows = Kind::kRows;
   template <class U>
-  using Force = typename Kind::template Force<U>;
+  using Handles = TwoHandle<U, kRows>;
+  template <class U>
+  using Force = HandleForce<U, kRows>;
 
   using Chain = typename Kind::template OfChain<T>;
   /// kLanes pieces side by side.
   struct Group : Kind::OfGroup {
     int pack = 0, length = 0;  ///< its packs
-    typename Kind::template Assembly<Lanes> assemblies;
+    Handles<Lanes> assemblies;
     Force<Lanes> F1, F2;  ///< on these
     double slack = 0.0;
   };
@@ -155,24 +161,41 @@ class ChainSweep : public ShortCut<Space, T> {
   std::vector<Chain> chains_;
   std::vector<Group> groups_;
   PackKinds<Link<Lanes>> packs_;
-  std::vector<typename Kind::template Cut<Lanes>> cuts_;  ///< by pack
+  std::vector<InnerCut<Lanes, kRows>> cuts_;  ///< by pack
   std::vector<Link<T>> singles_;
-  std::vector<typename Kind::template EndCut<T>> end_cuts_;  ///< by piece, then by single body
+  std::vector<EndCut<T, kRows>> end_cuts_;  ///< by piece, then by single body
   int num_pieces_ = 0;
   int packed_ = 0;  ///< bodies in pieces
 
  private:
   Own& own() { return static_cast<Own&>(*this); }
 
+  template <class U>
+  static U LimitOf(const Link<U>& link) {
+    if constexpr (kRows == 2) return link.limit;
+    return U{};
+  }
+
   template <Unknowns kUnknowns>
   void Up(Group& group) {
     Lanes slack = {};
-    auto start = own().Begin(group);
-    decltype(auto) all = own().template First<kUnknowns>(group, start);  // may be group.assemblies
-    for (int pack = group.pack + 1; pack < group.pack + group.length; ++pack) {
-      own().template Next<kUnknowns>(pack, start, all, slack);
+    auto before = own().MotionBefore(group);
+    // few numbers stay in registers
+    std::conditional_t<kRows == 2, Handles<Lanes>, Handles<Lanes>&> all = group.assemblies;
+    const auto first = own().template FreeOfPack<kUnknowns>(group.pack, before);
+    all.response = own().ResponseOfPack(group.pack);
+    LOOPBENCH_UNROLL
+    for (int i = 0; i < kRows; ++i) {
+      all.zeta13[i] = first.zeta13[i];
+      all.zeta23[i] = first.zeta23[i];
     }
-    if constexpr (!std::is_reference_v<decltype(all)>) group.assemblies = all;
+    for (int pack = group.pack + 1; pack < group.pack + group.length; ++pack) {
+      const auto free = own().template FreeOfPack<kUnknowns>(pack, before);
+      own().TurnToNext(pack * kLanes, all);
+      JoinSeries(all, own().ResponseOfPack(pack), free.zeta13, free.zeta23, LimitOf(packs_[pack]),
+                 cuts_[pack], slack);
+    }
+    if constexpr (kRows == 2) group.assemblies = all;
     group.slack = Smallest(slack);
   }
 
@@ -180,18 +203,36 @@ class ChainSweep : public ShortCut<Space, T> {
   template <Unknowns kUnknowns>
   T Up(Chain& chain) {
     T slack = {};
-    auto all = own().template Start<kUnknowns>(chain);
+    OneHandle<T, kRows> all = own().template Start<kUnknowns>(chain);
     for (int piece = chain.first_piece; piece < chain.first_piece + chain.pieces; ++piece) {
       if constexpr (kIsOne) {
-        slack = Min(slack, group_of(piece).slack);
-        own().AttachPiece(piece, piece == chain.first_piece, all, slack);
+        const Group& group = group_of(piece);
+        const Handles<double> next = LaneOf<Handles>(group.assemblies, lane_of(piece));
+        slack = Min(slack, group.slack);
+        Attach(piece, place_of_piece(piece), piece == chain.first_piece, next.response, next.zeta13,
+               next.zeta23, LimitOf(packs_[group.pack])[lane_of(piece)], all, slack);
       }
     }
     for (int k = 0; k < chain.singles; ++k) {
-      own().template AttachSingle<kUnknowns>(chain.first_single + k, k + chain.pieces == 0, all,
-                                             slack);
+      const int single = chain.first_single + k;
+      const auto free = own().template FreeOfSingle<kUnknowns>(single);
+      Attach(num_pieces_ + single, packed_ + single, k + chain.pieces == 0,
+             own().ResponseOfSingle(single), free.zeta13, free.zeta23, LimitOf(singles_[single]),
+             all, slack);
     }
     return own().template End<kUnknowns>(chain, all, slack);
+  }
+  /// Joins a node to the chain.
+  LOOPBENCH_INLINE void Attach(int node, int place, bool is_first, const Response<T, kRows>& next,
+                               const T* zeta13, const T* zeta23, const T& limit,
+                               OneHandle<T, kRows>& all, T& slack) {
+    if (Kind::kBeginsFree && is_first) {
+      all.zeta22 = next.zeta22;
+      std::copy_n(zeta23, kRows, all.zeta23);
+    } else {
+      own().TurnToNext(place, all);
+      all = JoinSeries(all, next, zeta13, zeta23, limit, end_cuts_[node], slack);
+    }
   }
 
   /// From the end of a chain: the force in the joint before a node, then the body's rates. Forces
@@ -201,25 +242,33 @@ class ChainSweep : public ShortCut<Space, T> {
     Force<T> F2 = own().template EndForce<kUnknowns>(chain);
     for (int k = chain.singles - 1; k >= 0; --k) {
       const int single = chain.first_single + k;
-      const Force<T> F1 = own().ForceIn(num_pieces_ + single, k + chain.pieces == 0, F2);
+      const Force<T> F1 = ForceBefore(num_pieces_ + single, k + chain.pieces == 0, F2);
       own().template RespondSingle<kUnknowns>(single, F1, F2);
       F2 = own().Opposite(packed_ + single, F1);
     }
     for (int piece = chain.first_piece + chain.pieces - 1; piece >= chain.first_piece; --piece) {
       if constexpr (kIsOne) {
-        const Force<double> F1 = own().ForceIn(piece, piece == chain.first_piece, F2);
-        SetLane(group_of(piece).F1, lane_of(piece), F1);
-        SetLane(group_of(piece).F2, lane_of(piece), F2);
+        const Force<double> F1 = ForceBefore(piece, piece == chain.first_piece, F2);
+        SetLane<Force>(group_of(piece).F1, lane_of(piece), F1);
+        SetLane<Force>(group_of(piece).F2, lane_of(piece), F2);
         F2 = own().Opposite(place_of_piece(piece), F1);
       }
     }
+  }
+  Force<T> ForceBefore(int node, bool is_first, const Force<T>& F2) const {
+    Force<T> F1 = {};
+    if (!Kind::kBeginsFree || !is_first) ForceIn(end_cuts_[node], F2.at, F1.at);
+    return F1;
   }
 
   template <Unknowns kUnknowns>
   void Down(Group& group) {
     Force<Lanes> F2 = group.F2;
     for (int pack = group.pack + group.length - 1; pack >= group.pack; --pack) {
-      const Force<Lanes> F1 = pack == group.pack ? group.F1 : own().ForceIn(pack, group.F1, F2);
+      Force<Lanes> F1 = group.F1;
+      if (pack > group.pack) {
+        ForceIn(cuts_[pack], own().ResponseOfPack(pack), group.F1.at, F2.at, F1.at);
+      }
       own().template Respond<kUnknowns>(group, pack, F1, F2);
       F2 = own().Opposite(pack * kLanes, F1);
     }

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "mechanism/algebra/instantiate.h"
+#include "mechanism/loops/self_stress.h"
 
 namespace loopbench::odca {
 
@@ -38,7 +39,8 @@ Odca<Space, S>::Odca(const Mechanism<Space, S>& mechanism, const FormulationOpti
       plan_(MakePlan(mechanism, plan.value_or(PlanOptionsOf(options.solver)))),
       sweep_(mechanism, plan_, options.solver, options.threads),
       equations_(mechanism),
-      change_(VectorX<S>::Zero(mechanism.num_u())) {
+      change_(VectorX<S>::Zero(mechanism.num_u())),
+      lambda_change_(VectorX<S>::Zero(mechanism.num_rows())) {
   if (options.solver != SolverKind::kRankRevealing || options.general) return;
   if constexpr (!std::is_same_v<S, double>) {
     return;
@@ -66,12 +68,17 @@ Outcome Odca<Space, S>::Factor(const Kinematics<Space, S>& kinematics) {
 }
 
 template <class Space, class S>
-void Odca<Space, S>::SweepTo(VectorX<S>& x, VectorX<S>* lambda) {
+void Odca<Space, S>::SolveEquations() {
   sweep_.Solve({.b = equations_.b(),
                 .wrenches = equations_.wrenches(),
                 .c0 = equations_.c0(),
                 .known = equations_.known()},
                equations_.A());
+}
+
+template <class Space, class S>
+void Odca<Space, S>::SweepTo(VectorX<S>& x, VectorX<S>* lambda) {
+  SolveEquations();
   equations_.Read(*kinematics_, x);
   if (lambda != nullptr) equations_.Read(sweep_.multipliers(), *lambda);
 }
@@ -94,6 +101,24 @@ bool Odca<Space, S>::Accelerate(const Kinematics<Space, S>& kinematics, const Ve
                                 VectorX<S>& udot, VectorX<S>* lambda) {
   equations_.SetState(kinematics, feedback);
   SweepTo(udot, lambda);
+  return true;
+}
+
+template <class Space, class S>
+bool Odca<Space, S>::AccelerateWithShare(const Kinematics<Space, S>& kinematics,
+                                         const VectorX<S>& feedback, SelfStress<Space, S>& stress,
+                                         VectorX<S>& udot, VectorX<S>* lambda) {
+  equations_.SetState(kinematics, feedback);
+  SolveEquations();
+  if (lambda != nullptr) equations_.Read(sweep_.multipliers(), *lambda);
+  equations_.SetMore(stress.ShareOfAccelerations(kinematics, equations_.A()));
+  SolveEquations();
+  equations_.AddLast();
+  equations_.Read(kinematics, udot);
+  if (lambda == nullptr) return true;
+  lambda_change_ = *lambda;
+  equations_.Read(sweep_.multipliers(), *lambda);
+  *lambda += lambda_change_;
   return true;
 }
 

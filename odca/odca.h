@@ -37,6 +37,9 @@ class Odca final : public ConstraintSolver<Space, S> {
   bool CompleteSpeeds(Kinematics<Space, S>& kinematics, VectorX<S>& u) override;
   bool Accelerate(const Kinematics<Space, S>& kinematics, const VectorX<S>& feedback,
                   VectorX<S>& udot, VectorX<S>* lambda) override;
+  bool AccelerateWithShare(const Kinematics<Space, S>& kinematics, const VectorX<S>& feedback,
+                           SelfStress<Space, S>& stress, VectorX<S>& udot,
+                           VectorX<S>* lambda) override;
   /// Any join that closes a loop may be regularized, also of tree joints.
   bool TakesWrenches() const override { return true; }
   void SolveWrenches(const VectorX<S>& wrenches, VectorX<S>& x, VectorX<S>* lambda) override;
@@ -56,7 +59,9 @@ class Odca final : public ConstraintSolver<Space, S> {
   Wrench<Space, S> JointForce(int joint) const;
 
  private:
-  /// The equations as they are set: x and multipliers.
+  /// Solves the equations as they are set.
+  void SolveEquations();
+  /// The same: x and multipliers.
   void SweepTo(VectorX<S>& x, VectorX<S>* lambda);
 
   const Mechanism<Space, S>& mechanism_;
@@ -68,7 +73,7 @@ class Odca final : public ConstraintSolver<Space, S> {
   bool by_short_cut_ = false;                         ///< the last evaluation was
   const Kinematics<Space, S>* kinematics_ = nullptr;  ///< of the last Factor()
   BodyEquations<Space, S> equations_;
-  VectorX<S> change_;
+  VectorX<S> change_, lambda_change_;
 };
 
 }  // namespace loopbench::odca

@@ -1,4 +1,4 @@
-// Paths of a mechanism, and their bodies as the links of two_handle.h. Each body has a joint to the
+// Paths of a mechanism, and their bodies as the links of pins.h. Each body has a joint to the
 // previous and to the next one; any may have one to Ground. Chains, ladders and arms are paths.
 #pragma once
 
@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "mechanism/model/mechanism.h"
+#include "odca/pins.h"
 #include "odca/plan.h"
-#include "odca/two_handle.h"
 
 namespace loopbench::odca::pins {
 

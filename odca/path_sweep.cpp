@@ -1,5 +1,5 @@
 // O-DCA for planar mechanisms whose bodies form paths (path_links.h) of pins under gravity:
-// computes rates directly from joint coordinates and speeds, in the kernels of two_handle.h.
+// computes rates directly from joint coordinates and speeds, in the kernels of pins.h.
 //
 //   angles and speeds of bodies   along the spanning tree (tree_angles.h)
 //   violations of cut joints      along each path
@@ -8,7 +8,7 @@
 // Other mechanisms of the same shape can fill unused lanes. T = Lanes holds kLanes mechanisms, one
 // per lane; T = double holds one.
 //
-// Pins that close loops must not be degenerate: if FactorsOf() finds a suspicious one, the general
+// Pins that close loops must not be degenerate: if Factor() finds a suspicious one, the general
 // sweep decides. Its scale is the trace of the free response of the joint's two bodies, which is at
 // least the scale of loop_solver.h.
 #include <algorithm>
@@ -93,7 +93,7 @@ void SetLimits(const Mechanism<Planar, double>& mechanism, int pieces, int lengt
 bool Says(double truth) { return truth > 0.0; }
 bool Says(const Lanes& truth) { return truth[0] > 0.0; }
 
-/// Imposes a cut joint before a body at its point on Q (two_handle.h), seen from the body: moves
+/// Imposes a cut joint before a body at its point on Q (pins.h), seen from the body: moves
 /// its handle 1 if it is P, and sets the violation. `gap` leads from there to the body before it.
 template <bool kOfSpeeds, class T>
 LOOPBENCH_INLINE void SetGap(const Closure<T>& closure, const Point<T>& gap, const T& speed,
@@ -110,16 +110,10 @@ LOOPBENCH_INLINE void SetGap(const Closure<T>& closure, const Point<T>& gap, con
 }
 
 struct PathKind {
+  static constexpr int kRows = pins::kRows;
+  static constexpr bool kBeginsFree = true;
   template <class T>
   using Link = pins::Link<T>;
-  template <class T>
-  using Force = Vector2<T>;
-  template <class T>
-  using Assembly = TwoHandle<T>;
-  template <class T>
-  using Cut = pins::Cut<T>;
-  template <class T>
-  using EndCut = pins::EndCut<T>;
 
   struct Shape : ChainNodes {
     bool has_loops = false;                            ///< points are followed along it
@@ -131,8 +125,9 @@ struct PathKind {
   /// Numbers that depend on the mechanism or on the state.
   template <class T>
   struct OfChain : Shape {
-    Vector2<T> end = {}, end_force = {};
-    Vector2<T> gap_v = {};  ///< as of TurnedLink, at that joint
+    Vector2<T> end = {};
+    HandleForce<T, pins::kRows> end_force = {};  ///< on the last body
+    Vector2<T> gap_v = {};                       ///< as of TurnedLink, at that joint
     T gap_w = {}, end_limit = {};
   };
   struct OfGroup {
@@ -482,65 +477,46 @@ class PathSweep final : public ChainSweep<PathSweep<T>, PathKind, Planar, T> {
   }
 
   // steps of ChainSweep
-  int Begin(const Group&) const { return 0; }
+  int MotionBefore(const Group&) const { return 0; }
+  // inlined for every T: products are fused with the sums of a join, and lanes need the same bits
   template <Unknowns kUnknowns>
-  TwoHandle<Lanes> LeafOf(int pack) const {
-    if constexpr (kUnknowns == Unknowns::kAccelerations) return LeafAlone(pack);
-    return Leaf<kUnknowns>(packs_[pack], turned_packs_[pack], Load<Lanes>(&speed_[pack * kLanes]));
-  }
-  /// Not inlined: its products would be fused with sums of a join, which gives other bits.
-  [[gnu::noinline]] TwoHandle<Lanes> LeafAlone(int pack) const {
-    return Leaf<Unknowns::kAccelerations>(packs_[pack], turned_packs_[pack],
-                                          Load<Lanes>(&speed_[pack * kLanes]));
+  LOOPBENCH_INLINE Free<Lanes> FreeOfPack(int pack, int) const {
+    return FreeMotion<kUnknowns>(packs_[pack], turned_packs_[pack],
+                                 Load<Lanes>(&speed_[pack * kLanes]));
   }
   template <Unknowns kUnknowns>
-  TwoHandle<Lanes> First(const Group& group, int) const {
-    return LeafOf<kUnknowns>(group.pack);
+  LOOPBENCH_INLINE Free<T> FreeOfSingle(int single) const {
+    return FreeMotion<kUnknowns>(singles_[single], turned_singles_[single],
+                                 speed_[packed_ + single]);
   }
-  template <Unknowns kUnknowns>
-  void Next(int pack, int, TwoHandle<Lanes>& all, Lanes& slack) {
-    const Lanes limit = packs_[pack].limit;
-    all = Join(all, LeafOf<kUnknowns>(pack), limit, cuts_[pack], slack);
+  LOOPBENCH_INLINE auto ResponseOfPack(int pack) const {
+    return ResponseOf(packs_[pack], turned_packs_[pack]);
   }
+  LOOPBENCH_INLINE auto ResponseOfSingle(int single) const {
+    return ResponseOf(singles_[single], turned_singles_[single]);
+  }
+  void TurnToNext(int /*place*/, auto& /*all*/) const {}
   template <Unknowns kUnknowns>
-  OneHandle<T> Start(const Chain&) const {
-    OneHandle<T> none = {};
+  OneHandle<T, kRows> Start(const Chain&) const {
+    OneHandle<T, kRows> none = {};
     return none;
   }
-  /// Not inlined, as LeafAlone().
-  [[gnu::noinline]] void Attach(int node, bool is_first, const TwoHandle<T>& next, const T& limit,
-                                OneHandle<T>& all, T& slack) {
-    if (is_first) {
-      all = {next.zeta22, next.zeta23};
-    } else {
-      all = Join(all, next, limit, end_cuts_[node], slack);
-    }
-  }
-  void AttachPiece(int piece, bool is_first, OneHandle<T>& all, T& slack) {
-    const Group& group = this->group_of(piece);
-    Attach(piece, is_first, LaneOf(group.assemblies, this->lane_of(piece)),
-           packs_[group.pack].limit[this->lane_of(piece)], all, slack);
-  }
   template <Unknowns kUnknowns>
-  void AttachSingle(int single, bool is_first, OneHandle<T>& all, T& slack) {
-    const Link<T>& link = singles_[single];
-    const T speed = speed_[packed_ + single];
-    Attach(num_pieces_ + single, is_first, Leaf<kUnknowns>(link, turned_singles_[single], speed),
-           link.limit, all, slack);
-  }
-  template <Unknowns kUnknowns>
-  T End(Chain& path, const OneHandle<T>& all, T slack) {
-    constexpr int kOfEach = Operations::Leaf(kUnknowns) + Operations::kAngularAcceleration + 1;
-    operations_ +=
-        path.pieces * this->length(path) * (kOfEach + Operations::kJoin + Operations::kForceIn) +
-        path.singles * (kOfEach + Operations::kEndJoin + Operations::kForceInEnd);
+  T End(Chain& path, const OneHandle<T, kRows>& all, T slack) {
+    constexpr int kOfEach =
+        kResponseWork + FreeMotionWork(kUnknowns) + kAngularAccelerationWork + 1;
+    using Work = Operations<kRows>;
+    operations_ += path.pieces * this->length(path) * (kOfEach + Work::kJoin + Work::kForceIn) +
+                   path.singles * (kOfEach + Work::EndJoin(kRows) + Work::ForceInEnd(kRows));
     if (!path.ends_at_ground) return slack;
     // Ground has no response (33, 34)
-    const Factored2<T> factors = FactorsOf(all.zeta22, path.end_limit, slack);
-    Vector2<T> wanted = {};  // of the last body, as TwoHandle::zeta13 of Leaf()
+    Factors<T, kRows> X = {all.zeta22};
+    Factor(X, path.end_limit, slack);
+    Vector2<T> wanted = {};  // of the last body, as zeta13 of FreeMotion()
     if (kUnknowns == Unknowns::kSpeeds) wanted = -path.gap_v;
     if (kUnknowns == Unknowns::kAccelerations) wanted = Cross<T>(2.0 * path.gap_w, path.gap_v);
-    path.end_force = factors * (all.zeta23 - wanted);
+    path.end_force = {wanted.x - all.zeta23[0], wanted.y - all.zeta23[1]};
+    X.Solve(path.end_force.at);
     return slack;
   }
   template <Unknowns kUnknowns>
@@ -548,28 +524,25 @@ class PathSweep final : public ChainSweep<PathSweep<T>, PathKind, Planar, T> {
     return slack;
   }
   template <Unknowns kUnknowns>
-  Vector2<T> EndForce(const Chain& path) {
-    return path.ends_at_ground ? -path.end_force : Vector2<T>{};
-  }
-  Vector2<T> ForceIn(int node, bool is_first, const Vector2<T>& F2) const {
-    return is_first ? Vector2<T>{} : pins::ForceIn(end_cuts_[node], F2);
-  }
-  Vector2<Lanes> ForceIn(int pack, const Vector2<Lanes>& F1, const Vector2<Lanes>& F2) const {
-    return pins::ForceIn(cuts_[pack], F1, F2);
+  HandleForce<T, kRows> EndForce(const Chain& path) {
+    return path.ends_at_ground ? path.end_force : HandleForce<T, kRows>{};
   }
   template <Unknowns kUnknowns>
-  void RespondSingle(int single, const Vector2<T>& F1, const Vector2<T>& F2) {
+  void RespondSingle(int single, const HandleForce<T, kRows>& F1, const HandleForce<T, kRows>& F2) {
     alpha_[packed_ + single] =
-        AngularAcceleration<kUnknowns>(turned_singles_[single], F1, F2) / singles_[single].radius;
+        AngularAcceleration<kUnknowns>(turned_singles_[single], F1.at, F2.at) /
+        singles_[single].radius;
   }
   template <Unknowns kUnknowns>
-  void Respond(const Group&, int pack, const Vector2<Lanes>& F1, const Vector2<Lanes>& F2) {
-    const Lanes alpha = AngularAcceleration<kUnknowns>(turned_packs_[pack], F1, F2);
+  void Respond(const Group&, int pack, const HandleForce<Lanes, kRows>& F1,
+               const HandleForce<Lanes, kRows>& F2) {
+    const Lanes alpha = AngularAcceleration<kUnknowns>(turned_packs_[pack], F1.at, F2.at);
     Store(alpha / packs_[pack].radius, &alpha_[pack * kLanes]);
   }
   template <class U>
-  Vector2<U> Opposite(int /*place*/, const Vector2<U>& F1) const {
-    return -F1;
+  LOOPBENCH_INLINE HandleForce<U, kRows> Opposite(int /*place*/,
+                                                  const HandleForce<U, kRows>& F1) const {
+    return {-F1.at[0], -F1.at[1]};
   }
 
   std::vector<Closure<Lanes>> pack_closures_;

@@ -1,13 +1,7 @@
-#include <fmt/format.h>
 #include <locale.h>
 
-#include <algorithm>
 #include <cctype>
-#include <charconv>
-#include <cstddef>
-#include <cstdint>
 #include <cwchar>
-#include <iterator>
 #include <span>
 
 #include "harness/base/text.h"
@@ -19,12 +13,13 @@ bool IsAlphanumeric(char c) {
   return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9');
 }
 
-// Character of UTF-8: its code point and length in bytes; length 0 for an invalid byte.
+/// Character of UTF-8: its code point and length in bytes.
 struct Character {
   std::uint32_t code = 0;
   std::size_t length = 0;
 };
 
+/// Returns the first character; length 0 for an invalid byte.
 Character FirstOf(std::string_view text) {
   const auto byte = [&](std::size_t i) { return static_cast<unsigned char>(text[i]); };
   const std::uint32_t first = byte(0);
@@ -76,10 +71,7 @@ std::string Escape(std::string_view text, bool keep_line_ends) {
 bool IsFormula(std::string_view text) {
   constexpr std::string_view kBegins = "=+-@";
   if (text.empty() || kBegins.find(text[0]) == text.npos || text == "-") return false;
-  double number = 0.0;
-  text.remove_prefix(text.starts_with('+') ? 1 : 0);
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
-  return error != std::errc{} || end != text.data() + text.size();
+  return !WholeNumber<double>(text.substr(text.starts_with('+') ? 1 : 0));
 }
 
 // Returns true if the character at `i` could begin or end markup there.
@@ -313,6 +305,8 @@ std::vector<std::string> BrokenInto(std::string_view text, std::size_t width) {
   lines.emplace_back(text);
   return lines;
 }
+
+std::size_t CharacterLength(std::string_view text) { return FirstOf(text).length; }
 
 std::size_t CountCharacters(std::string_view text) {
   return text.size() -

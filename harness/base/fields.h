@@ -89,8 +89,7 @@ class Fields {
     }
   }
 
-  /// Reads all rows into `result`. Returns false, and reads nothing, if `node` is not an object.
-  /// Reports unknown keys first.
+  /// Reads all rows into `result`, or returns false if `node` is no object. Reports unknown keys.
   bool Read(const JsonNode& node, T* result, C&... context) const {
     if (!node.ExpectObject(keys_)) return false;
     ReadRows(node, result, context...);
@@ -216,8 +215,7 @@ Json NameOf(const Chosen& chosen, const NameList& names) {
   }
 }
 
-/// Returns a choice among names; `what` names the object. The member is the name, or an enum or
-/// bool with the name's index as its value.
+/// Returns a choice among names of `what`. The member is the name, or an enum or bool of its index.
 template <class T, class Chosen>
 FieldValue<T> Choice(Chosen T::*member, const NameList& names, std::string what) {
   return {ChoiceSchema(names.all()),
@@ -229,8 +227,7 @@ FieldValue<T> Choice(Chosen T::*member, const NameList& names, std::string what)
           [=](const T& owner) { return NameOf(owner.*member, names); }};
 }
 
-/// Returns one or several different names, as in Choice(). `names()` returns the names at the time
-/// of reading.
+/// Returns one or several different names, as in Choice(). `names()` is called when reading.
 template <class T, class Chosen, class Names>
 FieldValue<T> Choices(std::vector<Chosen> T::*member, Names names, std::string what) {
   return {OneOrMoreSchema(ChoiceSchema(NameList(names()).all()), true),

@@ -1,8 +1,5 @@
 #include "harness/base/file_kind.h"
 
-#include <fmt/format.h>
-
-#include <algorithm>
 #include <array>
 
 #include "harness/base/fields.h"

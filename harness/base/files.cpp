@@ -1,5 +1,4 @@
 #include <fcntl.h>
-#include <fmt/format.h>
 #include <sys/file.h>
 #include <sys/mman.h>
 #include <sys/prctl.h>
@@ -7,32 +6,25 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include <algorithm>
 #include <array>
 #include <atomic>
 #include <cerrno>
-#include <csignal>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
 #include <exception>
 #include <fstream>
-#include <iterator>
 #include <mutex>
 #include <new>
 #include <set>
-#include <stdexcept>
-#include <system_error>
-#include <utility>
-#include <vector>
 
 #include "harness/base/text.h"
 
 namespace loopbench::harness {
 namespace {
 
-/// Paths to remove, readable by a signal handler. Paths that do not fit are removed only by their
-/// owner.
+/// Paths to remove, readable by a signal handler. If all places are taken, only the owner removes a
+/// path.
 struct Registered {
   std::atomic<const char*> path = nullptr;
   std::atomic<pid_t> owner = 0;
@@ -75,13 +67,10 @@ int LockFolder(const std::filesystem::path& path) {
 /// Removes the folders of killed processes: no process holds their locks.
 void RemoveAbandoned(const std::filesystem::path& folder, const std::string& begin) {
   std::error_code ignored;
-  std::vector<std::filesystem::path> found;
-  for (const auto& entry : std::filesystem::directory_iterator(folder, ignored)) {
-    const std::string name = entry.path().filename().string();
-    if (name.starts_with(begin) && name.size() == begin.size() + 6) found.push_back(entry.path());
-  }
-  for (const auto& path : found) {
-    const int lock = LockFolder(path);
+  for (const auto& path : EntriesOf(folder)) {
+    const std::string name = path.filename().string();
+    const bool is_one = name.starts_with(begin) && name.size() == begin.size() + 6;
+    const int lock = is_one ? LockFolder(path) : -1;
     if (lock < 0) continue;
     std::filesystem::remove_all(path, ignored);
     ::close(lock);
@@ -107,6 +96,14 @@ Inputs inputs;
       fmt::format("cannot write '{}': found {}, expected a file that can be replaced, a pipe or a "
                   "character device",
                   path.string(), found));
+}
+
+/// Returns true for a file that only runs write: a trajectory, mechanism or reference of a store,
+/// in the folder of this kind and named by its identifier of 16 hexadecimal digits.
+bool IsOfStore(const fs::path& file) {
+  const std::string folder = file.parent_path().filename(), name = file.stem();
+  return (folder == "trajectories" || folder == "mechanisms" || folder == "references") &&
+         name.size() == 16 && name.find_first_not_of("0123456789abcdef") == std::string::npos;
 }
 
 /// Destination of output to a path.
@@ -140,6 +137,10 @@ Destination DestinationOf(const fs::path& path, Onto onto) {
   }
   if (::access(path.c_str(), W_OK) != 0) FailOn("write", path);
   const fs::path target = BehindLinks(path);
+  std::error_code ignored;
+  if (onto == Onto::kNoInput && IsOfStore(fs::canonical(target, ignored))) {
+    Refuse(path, "a file of a store");
+  }
   // a file that only /proc names, such as a removed file
   if (::stat(target.c_str(), &other) != 0 || IdOf(other) != IdOf(there)) return {};
   return {.target = target, .mode = there.st_mode & 07777};
@@ -208,8 +209,8 @@ void MakeFolderOf(const std::filesystem::path& path) {
       fmt::format("cannot make folder '{}': {}", path.parent_path().string(), reason));
 }
 
-void WriteFileAtomically(const std::filesystem::path& path, std::string_view text) {
-  OutputFile file(path);
+void WriteFileAtomically(const std::filesystem::path& path, std::string_view text, Onto onto) {
+  OutputFile file(path, onto);
   file.Write(text);
   file.Finish();
 }
@@ -236,6 +237,26 @@ void WriteAll(int descriptor, std::string_view text, const std::filesystem::path
     if (written < 0) FailOn("write", path);
     text.remove_prefix(static_cast<std::size_t>(written));
   }
+}
+
+void ForEachBlock(const std::filesystem::path& file,
+                  const std::function<void(std::string_view)>& use) {
+  std::ifstream in(file, std::ios::binary);
+  std::string block(std::size_t{1} << 20, '\0');
+  while (in.read(block.data(), static_cast<std::streamsize>(block.size())) || in.gcount() > 0) {
+    use(std::string_view(block).substr(0, static_cast<std::size_t>(in.gcount())));
+  }
+  if (!in.eof()) FailOn("read", file);
+}
+
+std::vector<std::filesystem::path> EntriesOf(const std::filesystem::path& folder) {
+  std::error_code error;
+  std::vector<std::filesystem::path> paths;
+  for (const auto& entry : std::filesystem::directory_iterator(folder, error)) {
+    paths.push_back(entry.path());
+  }
+  std::ranges::sort(paths);
+  return paths;
 }
 
 std::string ReadFile(const std::filesystem::path& path) {
@@ -335,11 +356,8 @@ fs::path BehindLinks(fs::path file) {
 
 void RemoveAbandoned(const fs::path& folder) {
   std::error_code ignored;
-  std::vector<fs::path> found;
-  for (const auto& entry : fs::directory_iterator(folder, ignored)) {
-    if (IsOfEndedProcess(entry.path().filename().string())) found.push_back(entry.path());
-  }
-  for (const fs::path& path : found) {
+  for (const fs::path& path : EntriesOf(folder)) {
+    if (!IsOfEndedProcess(path.filename().string())) continue;
     const int descriptor = ::open(path.c_str(), O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC);
     if (descriptor < 0) continue;
     if (::flock(descriptor, LOCK_EX | LOCK_NB) == 0) fs::remove(path, ignored);

@@ -1,22 +1,16 @@
 #include "harness/base/json_document.h"
 
-#include <fmt/format.h>
-
-#include <algorithm>
 #include <fstream>
 #include <ranges>
 #include <set>
-#include <system_error>
 #include <unordered_set>
-#include <utility>
 
 #include "harness/base/text.h"
 
 namespace loopbench::harness {
 namespace {
 
-/// Line and column of the byte at `position`, from 1. Columns count bytes, as in the messages of
-/// compilers.
+/// Line and column of the byte at `position`, from 1. Columns count bytes, as compilers do.
 std::pair<std::ptrdiff_t, std::size_t> PlaceOf(std::string_view text, std::size_t position) {
   const std::string_view before = text.substr(0, position);
   // from the line end before the place, or from npos = -1
@@ -172,21 +166,6 @@ std::string_view WideEncoding(std::string_view text) {
   if (text.starts_with("\xFF\xFE"sv) || text.starts_with("\xFE\xFF"sv)) return "UTF-16";
   if (text.size() < 2 || (text[0] == '\0') == (text[1] == '\0')) return "";
   return text.size() >= 4 && text[1] == '\0' && text[2] == '\0' ? "UTF-32" : "UTF-16";
-}
-
-/// Returns the bytes of the first UTF-8 character, or 0 if it is invalid.
-std::size_t CharacterLength(std::string_view text) {
-  const auto byte = [text](std::size_t i) { return static_cast<unsigned char>(text[i]); };
-  const unsigned first = byte(0);
-  if (first < 0x80) return 1;
-  const std::size_t length = first >= 0xF0 ? 4 : first >= 0xE0 ? 3 : 2;
-  if (first < 0xC2 || first > 0xF4 || text.size() < length) return 0;
-  if (!std::ranges::all_of(text.substr(1, length - 1), ContinuesCharacter)) return 0;
-  // overlong forms, surrogates, beyond U+10FFFF
-  const unsigned second = byte(1);
-  const bool refused = (first == 0xE0 && second < 0xA0) || (first == 0xED && second > 0x9F) ||
-                       (first == 0xF0 && second < 0x90) || (first == 0xF4 && second > 0x8F);
-  return refused ? 0 : length;
 }
 
 bool IsWordCharacter(char c) {
@@ -403,6 +382,10 @@ std::string SyntaxMessage(const std::string& message, std::string_view text, std
     found = letters ? ShortToken(std::string(word)) : fmt::format("'{}'", word);
   }
   return fmt::format("found {}, expected {}{}", found, expected, Hint(text, position, word));
+}
+
+std::string CompactText(const Json& value) {
+  return value.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 
 std::string FlatText(const Json& value) {

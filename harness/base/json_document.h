@@ -26,12 +26,10 @@ inline constexpr std::size_t kMaxConfigBytes = 16u << 20;
 /// Limit of nesting depth, so that recursion over a document cannot exhaust the stack.
 inline constexpr std::size_t kMaxConfigDepth = 64;
 
-/// Maximum number of messages; further errors are only counted. A file full of errors must not be
-/// slower to read than a valid file.
+/// Maximum number of messages, to read files full of errors fast; further errors are counted.
 inline constexpr std::size_t kMaxMessages = 100;
 
-/// Returns the text of a file. Throws ConfigError with the file and the reason (missing, a folder,
-/// not readable, larger than kMaxConfigBytes).
+/// Returns the text of a file of at most kMaxConfigBytes. Throws ConfigError with file and reason.
 std::string ReadTextFile(const std::filesystem::path& path);
 
 /// Parses RFC 8259 JSON in UTF-8; `file` is the name used in messages.
@@ -57,8 +55,7 @@ std::string ShownPointer(const std::string& pointer);
 /// Returns the text with control characters escaped as in JSON, so that a message is one line.
 std::string Printable(const std::string& text);
 
-/// Returns "" if the text is UTF-8 without byte order mark and zero bytes, otherwise "LINE:COLUMN:
-/// found ..., expected ...".
+/// Returns "" for UTF-8 without byte order mark and zero bytes, or "LINE:COLUMN: found ...".
 std::string EncodingFault(std::string_view text);
 
 /// Returns "found ..., expected ... (hint)" from the parser's message about `text`. `position` is
@@ -68,12 +65,14 @@ std::string SyntaxMessage(const std::string& message, std::string_view text, std
 /// Returns the last characters of a token, which may be megabytes long.
 std::string ShortToken(const std::string& token);
 
+/// Returns the value on one line without spaces; invalid UTF-8 is replaced.
+std::string CompactText(const Json& value);
+
 /// Returns the value on one line, with a space after each comma and colon.
 std::string FlatText(const Json& value);
 
 /// Returns the text of a file: a value on one line if it fits, otherwise one element per line,
-/// indented by two. Lines of at most 100 characters where that is possible. Numbers are read back
-/// to the same bits.
+/// indented by two. Lines have at most 100 characters if possible. Numbers keep their bits.
 std::string JsonText(const Json& document);
 
 }  // namespace loopbench::harness

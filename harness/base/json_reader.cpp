@@ -1,9 +1,5 @@
 #include "harness/base/json_reader.h"
 
-#include <fmt/format.h>
-
-#include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <set>
 
@@ -19,7 +15,7 @@ constexpr std::size_t kMaxListed = 32;     ///< names in a message
 std::string Shown(const Json& value) {
   if (value.is_object()) return value.empty() ? "an empty object" : "an object";
   if (value.is_array() && value.empty()) return "an empty array";
-  std::string text = value.dump(-1, ' ', false, Json::error_handler_t::replace);
+  std::string text = CompactText(value);
   if (text.size() <= kLongestShown) return text;
   if (value.is_array()) return fmt::format("an array of {} values", value.size());
   return Abbreviated(text, kLongestShown);
@@ -53,8 +49,7 @@ std::string Listed(const std::vector<std::string>& names) {
 
 // Lists of numbers in a file: one, several, or a range.
 
-/// Returns the short decimal number if only round-off separates it from `value`: 1e-08 for the
-/// 1.0000000000000002e-08 that a power gives.
+/// Returns the short decimal number up to round-off: 1e-08 for 1.0000000000000002e-08.
 double Clean(double value) {
   const std::string text = fmt::format("{:.13g}", value);
   double rounded = value;

@@ -21,8 +21,7 @@ namespace loopbench::harness {
 /// that file. Messages must still name the file and line to edit.
 class Origins {
  public:
-  /// Origin in document `file` with this text, which must outlive the object. If the text is "",
-  /// messages have no line numbers.
+  /// Origin in document `file`; its text outlives the object. "": messages without line numbers.
   explicit Origins(std::string file, std::string_view text = "") {
     parts_.push_back({"", std::move(file), text, "", ""});
   }
@@ -88,13 +87,11 @@ class ErrorList {
            std::string_view suggestion = "");
 
   /// Adds an error that may share its cause with others, such as a key missing elsewhere. The
-  /// message is "found ..., expected ..., or CURE" with the locations of the other errors, which
-  /// have no own messages.
+  /// message is "found ..., expected ..., or CURE" with the locations of the others.
   void AddWithCure(std::string_view cure, std::string_view pointer, std::string_view found,
                    std::string_view expected);
 
-  /// Adds complete messages, such as messages of an included file. Equal texts (two problems with
-  /// one invalid mechanism) are added once.
+  /// Adds complete messages, such as those of an included file. Equal texts are added once.
   void AddText(const std::string& text);
 
   /// Returns the place "FILE:LINE: /json/pointer" of a value, for messages after reading.
@@ -104,8 +101,7 @@ class ErrorList {
   /// Returns true if further errors are only counted and need no text.
   bool full() const { return messages_.size() >= kMaxMessages; }
 
-  /// Throws ConfigError with all messages, one per line, if there are any. `ending` is an
-  /// additional line.
+  /// Throws ConfigError with all messages, one per line, and a line `ending`, if there are any.
   void ThrowIfAny(const std::string& ending = "") const;
 
  private:
@@ -131,8 +127,7 @@ class NameList {
   }
   NameList(std::initializer_list<std::string> names) : NameList(std::vector<std::string>(names)) {}
 
-  /// Adds a name with the next index. Repeated names, which are errors of the file, are stored as
-  /// empty names.
+  /// Adds a name with the next index; a repeated name, an error of the file, as an empty one.
   void Add(const std::string& name) {
     const bool first = indices_.emplace(name, names_.size()).second;
     names_.push_back(first ? name : "");

@@ -1,6 +1,3 @@
-#include <fmt/format.h>
-
-#include <algorithm>
 #include <array>
 #include <set>
 
@@ -53,6 +50,9 @@ bool IsTrue(const JsonNode& owner, const std::string& key) {
   return node && node->Bool();
 }
 
+/// Times in any unit: sums and squares of their nanoseconds are finite.
+constexpr Range kTimes = {.min = 0.0, .max = 1e100};
+
 /// Returns one of the times of a run [ns].
 double Time(const JsonNode& run, const std::string& key) {
   const std::array<double, 4> nanoseconds = {1.0, 1e3, 1e6, 1e9};
@@ -60,7 +60,7 @@ double Time(const JsonNode& run, const std::string& key) {
   const std::optional<int> index =
       unit ? unit->Choice({"ns", "us", "ms", "s"}, "a unit of time") : std::optional<int>(0);
   const std::optional<JsonNode> time = run.Required(key, "a time");
-  return index && time ? time->Number(kNotNegative) * nanoseconds[*index] : 0.0;
+  return index && time ? time->Number(kTimes) * nanoseconds[*index] : 0.0;
 }
 
 /// All repetitions of one benchmark.

@@ -4,9 +4,10 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
-#include <charconv>
+#include <optional>
 #include <string>
-#include <system_error>
+
+#include "harness/base/text.h"
 
 namespace loopbench::harness {
 
@@ -15,13 +16,11 @@ namespace loopbench::harness {
 template <typename T>
 CLI::Validator NumberFrom(T least, T most) {
   const auto check = [least, most](std::string& text) -> std::string {
-    T number{};
-    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
-    const bool whole = error == std::errc() && end == text.data() + text.size();
-    if (!whole || !(number >= least && number <= most)) {
+    const std::optional<T> number = WholeNumber<T>(text);
+    if (!(number >= least && number <= most)) {
       return fmt::format("found \"{}\", expected a number from {} to {}", text, least, most);
     }
-    text = fmt::format("{}", number);
+    text = fmt::format("{}", *number);
     return "";
   };
   return CLI::Validator(check, fmt::format("{} to {}", least, most));

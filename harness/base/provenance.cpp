@@ -1,13 +1,9 @@
 #include <fmt/chrono.h>
-#include <fmt/format.h>
 #include <sys/utsname.h>
 
 #include <Eigen/Core>
 #include <cmath>
-#include <ctime>
-#include <filesystem>
 #include <fstream>
-#include <iterator>
 #include <thread>
 
 #include "harness/base/record.h"

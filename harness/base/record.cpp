@@ -1,12 +1,7 @@
 #include "harness/base/record.h"
 
-#include <fmt/format.h>
-
-#include <algorithm>
 #include <cmath>
 #include <limits>
-#include <stdexcept>
-#include <type_traits>
 
 #include "harness/base/json_document.h"
 #include "harness/base/text.h"
@@ -32,15 +27,11 @@ Json FromValue(const Value& value) {
   return std::visit(convert, value);
 }
 
-std::string Dumped(const Json& json) {
-  return json.dump(-1, ' ', false, Json::error_handler_t::replace);
-}
-
 constexpr std::string_view kKey = "\"checksum\":\"";
 constexpr std::size_t kDigits = 16, kSuffix = kKey.size() + kDigits + 2;  // with "}
 
 /// Returns a value as JSON.
-std::string ValueText(const Value& value) { return Dumped(FromValue(value)); }
+std::string ValueText(const Value& value) { return CompactText(FromValue(value)); }
 
 }  // namespace
 
@@ -93,7 +84,7 @@ const std::vector<double>& Record::Numbers(std::string_view key) const {
 std::string ToJsonObject(const Record& record) {
   Json object = Json::object();
   for (const auto& [key, value] : record.items()) object[key] = FromValue(value);
-  return Dumped(object);
+  return CompactText(object);
 }
 
 std::string ToJsonLine(const Record& record) {

@@ -77,11 +77,9 @@ enum class Rule {
 /// Conditions under which a repeated case gives the same value.
 enum class Repeats {
   kAlways,
-  /// Depends on the last bits of floating-point numbers or on compiled code (alignment of memory):
-  /// comparable under one arithmetic only (Origin).
+  /// Depends on last bits or on compiled code: comparable under one arithmetic only (Origin).
   kUnderOneArithmetic,
-  /// Depends on the clock, the machine and its load, or the typed command: two runs of one case by
-  /// one program may differ in it.
+  /// Depends on the clock, the machine, its load or the typed command: equal runs may differ.
   kNever,
 };
 
@@ -133,8 +131,7 @@ double Quantile(std::vector<double> sample, double fraction);
 double AaSpread(const std::vector<double>& first, const std::vector<double>& second);
 
 struct NoiseThresholds {
-  /// 2 % is the smallest difference that `compare` reports as an effect. If equal subjects differ
-  /// by more, no such difference is credible.
+  /// Smallest difference that `compare` reports: not credible if equal subjects differ by more.
   double aa_spread = 0.02;
 
   /// Runnable processes per processor. Up to 1 the timed process has a free processor; above, the
@@ -234,8 +231,7 @@ std::string ToJsonObject(const Record& record);
 /// length.
 Record FromJsonLine(std::string_view line, bool* is_sealed = nullptr);
 
-/// True if `line` is only the beginning of a line that ToJsonLine() wrote of a run's record, as
-/// after a crash.
+/// True if `line` is only the beginning of a run's line by ToJsonLine(), as after a crash.
 bool IsTornRecord(std::string_view line);
 
 /// Returns 16 hexadecimal digits that identify a case: FNV-1a (64 bit) of the JSON of its keys,
@@ -257,8 +253,7 @@ bool VerifyChecksum(std::string_view line);
 /// bytes at most, other bytes as \xNN.
 std::string Excerpt(std::string_view text);
 
-/// JSON object for programs, with keys in the order of adding. Invalid UTF-8, NaN and infinity are
-/// converted as in records.
+/// JSON object for programs, with keys in the order of adding. Converts values as records do.
 class JsonObject {
  public:
   JsonObject() = default;
@@ -285,8 +280,7 @@ inline Value Count(std::size_t number) { return static_cast<std::int64_t>(number
 /// Returns "[...]", one object per line.
 std::string JsonList(const std::vector<JsonObject>& objects);
 
-/// Origin of a record. Every record contains it because it limits comparisons: times need one
-/// machine, bits one arithmetic.
+/// Origin of a record, which limits comparisons: times need one machine, bits one arithmetic.
 struct Origin {
   std::string machine;   ///< processor model and number of logical processors
   std::string compiler;  ///< name and version
@@ -316,8 +310,7 @@ std::vector<std::string> Provenance(const std::string& command);
 /// Returns the output of `loopbench --version`: the version, and facts independent of the command.
 std::string VersionText();
 
-/// Returns 16 hexadecimal digits that change with any byte of this program: results of different
-/// versions are different results.
+/// Returns 16 hexadecimal digits that change with any byte of this program.
 const std::string& CodeVersion();
 
 /// Returns the program's name and its arguments, separated by spaces.
@@ -351,8 +344,7 @@ using Selection = std::vector<Condition>;
 /// Throws ConfigError if the key or the value is missing, or an order operator has no number.
 Condition ParseCondition(std::string_view text);
 
-/// True if the record meets every condition. A record without the key, or with NaN under it, meets
-/// no condition on it, not even "!=".
+/// True if the record meets every condition. None holds for a missing key or NaN, not even "!=".
 bool Matches(const Record& record, const Selection& selection);
 
 /// Returns the matching records, in their order.
@@ -368,8 +360,7 @@ std::string ToText(const Selection& selection);
 /// last.
 void SortRows(std::vector<Record>* records);
 
-/// Sorts stably by one key: numbers by size, then texts in text order. Records without the key, or
-/// with NaN, come last in both directions.
+/// Sorts stably by one key: numbers, then texts; missing values and NaN last in both directions.
 void SortRowsBy(std::vector<Record>* records, const std::string& key, bool descending);
 
 }  // namespace loopbench::harness

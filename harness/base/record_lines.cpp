@@ -1,13 +1,10 @@
 #include <fcntl.h>
-#include <fmt/format.h>
 #include <unistd.h>
 
-#include <algorithm>
 #include <array>
 #include <cmath>
 #include <fstream>
 #include <limits>
-#include <stdexcept>
 #include <unordered_set>
 
 #include "harness/base/json_document.h"
@@ -17,8 +14,7 @@
 namespace loopbench::harness {
 namespace {
 
-// FromJsonLine: parses a flat object value by value. Nothing nests, so the cost is linear in the
-// length of a line, at any depth.
+// FromJsonLine: parses a flat object value by value, in linear time.
 
 using LineJson = nlohmann::ordered_json;
 
@@ -268,12 +264,7 @@ void ForEachRecord(const std::filesystem::path& path, const LineReader::Take& ta
     reader.Feed(ReadFile(file));
   } else {
     NoteInput(file);
-    std::ifstream in(file, std::ios::binary);
-    std::string block(std::size_t{4} << 20, '\0');
-    while (in.read(block.data(), static_cast<std::streamsize>(block.size())) || in.gcount() > 0) {
-      reader.Feed(std::string_view(block).substr(0, static_cast<std::size_t>(in.gcount())));
-    }
-    if (!in.eof()) FailOn("read", file);
+    ForEachBlock(file, [&reader](std::string_view block) { reader.Feed(block); });
   }
   reader.End();
   if (warnings != nullptr && !reader.warning().empty()) warnings->push_back(reader.warning());

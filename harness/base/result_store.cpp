@@ -1,13 +1,9 @@
-#include <fmt/format.h>
 #include <unistd.h>
 
-#include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <fstream>
 #include <map>
 #include <set>
-#include <stdexcept>
 
 #include "harness/base/store.h"
 #include "harness/base/text.h"
@@ -15,8 +11,7 @@
 namespace loopbench::harness {
 namespace {
 
-/// Returns the end of a large file, from the beginning of a line: the last megabyte, or the last
-/// two lines if these are longer.
+/// Returns the end of a large file, from a line's beginning: a megabyte, or two longer lines.
 std::string LastLines(const std::filesystem::path& file, std::uintmax_t size) {
   std::ifstream in(file, std::ios::binary);
   for (std::uintmax_t length = 1 << 20;; length *= 4) {
@@ -35,20 +30,16 @@ std::string LastLines(const std::filesystem::path& file, std::uintmax_t size) {
 
 /// Counts line ends among the first bytes of a file.
 int CountLines(const std::filesystem::path& file, std::uintmax_t bytes) {
-  std::ifstream in(file, std::ios::binary);
-  std::string block(std::size_t{4} << 20, '\0');
   std::ptrdiff_t lines = 0;
-  while (bytes > 0) {
-    block.resize(static_cast<std::size_t>(std::min<std::uintmax_t>(bytes, block.size())));
-    if (!in.read(block.data(), static_cast<std::streamsize>(block.size()))) FailOn("read", file);
-    lines += std::ranges::count(block, '\n');
-    bytes -= block.size();
-  }
+  ForEachBlock(file, [&](std::string_view block) {
+    const std::string_view counted = block.substr(0, bytes);
+    lines += std::ranges::count(counted, '\n');
+    bytes -= counted.size();
+  });
   return static_cast<int>(lines);
 }
 
-/// Feeds the end of a file. For an invalid line, the error names its line number in the file;
-/// earlier lines are counted only then.
+/// Feeds the end of a file. Earlier lines are counted only for the error of an invalid line.
 LineReader ReadEnd(const std::filesystem::path& file, const std::string& text,
                    std::uintmax_t before) {
   const auto feed = [&](int lines_before) {
@@ -75,8 +66,7 @@ LineReader ReadEnd(const std::filesystem::path& file, const std::string& text,
   return feed(CountLines(file, before));
 }
 
-/// Completes the last line: adds a line end to a complete record, removes a torn one. Leaves a file
-/// that is no store unchanged.
+/// Adds a line end to a complete last record, removes a torn one. Other files stay unchanged.
 void MendLastLine(const std::filesystem::path& file, int descriptor) {
   const std::uintmax_t size = std::filesystem::file_size(file);
   const std::string text = IsLarge(file) ? LastLines(file, size) : ReadFile(file);
@@ -168,10 +158,7 @@ Record ToldApart(const Record& record, const Namesakes& namesakes) {
 
 /// Converts the sixteen digits to a number.
 std::optional<std::uint64_t> NumberOfId(std::string_view id) {
-  std::uint64_t number = 0;
-  const auto [end, error] = std::from_chars(id.data(), id.data() + id.size(), number, 16);
-  const bool is_whole = error == std::errc() && end == id.data() + id.size() && id.size() == 16;
-  return is_whole ? std::optional(number) : std::nullopt;
+  return id.size() == 16 ? WholeNumber<std::uint64_t>(id, 16) : std::nullopt;
 }
 
 }  // namespace

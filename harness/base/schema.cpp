@@ -47,8 +47,7 @@ std::string NameOf(const Json& reference) {
   return path.substr(path.rfind('/') + 1);
 }
 
-/// Removes keys that are not in draft 07: the schemas from Named(), moved to `definitions` in the
-/// order of first use, and the words.
+/// Removes keys that are not in draft 07: words, and schemas of Named(), moved to `definitions`.
 void TakeOwn(Json* node, Json* definitions) {
   if (!node->is_structured()) return;
   if (node->is_object() && node->contains("$ref") && node->contains("schema")) {

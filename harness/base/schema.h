@@ -54,8 +54,7 @@ struct FieldSchema {
 /// Returns the schema of an object with these fields only.
 Json ObjectSchema(const std::string& sentence, const std::vector<FieldSchema>& fields);
 
-/// Returns the text of configs/schema/*.schema.json, with lines of at most 100 characters if
-/// possible.
+/// Returns the text of configs/schema/*.schema.json, in lines of at most 100 characters.
 std::string SchemaText(const std::string& title, const Json& object);
 /// Returns Markdown tables of fields, one for each kind of file and for each object in it.
 std::string SchemaTables(const std::vector<std::pair<std::string, Json>>& kinds);

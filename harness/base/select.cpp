@@ -1,25 +1,11 @@
-#include <fmt/format.h>
-
-#include <algorithm>
 #include <array>
-#include <charconv>
 #include <cmath>
-#include <iterator>
-#include <optional>
-#include <system_error>
 
 #include "harness/base/record.h"
 #include "harness/base/text.h"
 
 namespace loopbench::harness {
 namespace {
-
-std::optional<double> ParseNumber(std::string_view text) {
-  double number = 0.0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
-  if (error != std::errc{} || end != text.data() + text.size()) return std::nullopt;
-  return number;
-}
 
 bool Holds(const Record& record, const Condition& condition) {
   const Value* value = record.Find(condition.key);
@@ -29,10 +15,10 @@ bool Holds(const Record& record, const Condition& condition) {
   const double number = record.Number(condition.key);
   if (numeric && std::isnan(number)) return false;
   const auto is = [&](const std::string& wanted) {
-    return numeric ? ParseNumber(wanted) == number : record.Text(condition.key) == wanted;
+    return numeric ? WholeNumber<double>(wanted) == number : record.Text(condition.key) == wanted;
   };
   // ParseCondition() ensures that an order operator has one number
-  const auto bound = [&] { return ParseNumber(condition.values.front()).value(); };
+  const auto bound = [&] { return WholeNumber<double>(condition.values.front()).value(); };
   switch (condition.op) {
     case Operator::kEqual:
       return std::ranges::any_of(condition.values, is);
@@ -69,7 +55,7 @@ void RequireOneNumber(std::string_view text, const Condition& condition) {
                                   text, condition.values.size(), ToString(condition.op)));
   }
   const std::string& value = condition.values.front();
-  const auto number = ParseNumber(value);
+  const auto number = WholeNumber<double>(value);
   if (number && !std::isnan(*number)) return;
   throw ConfigError(fmt::format("filter '{}': found \"{}\", expected a number behind {}", text,
                                 value, ToString(condition.op)));

@@ -52,8 +52,7 @@ class LineReader {
   LineReader(std::filesystem::path file, Take take, Wanted wanted = {}, int lines_before = 0);
 
   /// Takes the next part of the text, of any length. Throws std::runtime_error with file, line
-  /// number and text for an invalid line, one without values, or one without checksum among lines
-  /// with one. Ignores empty lines.
+  /// number and text for an invalid line, one without values, or one without checksum among others.
   void Feed(std::string_view text);
 
   /// Ends the text. A last line without line end may be a record, or the torn beginning of one
@@ -86,8 +85,7 @@ class LineReader {
 void ForEachRecord(const std::filesystem::path& path, const LineReader::Take& take,
                    std::vector<std::string>* warnings, const LineReader::Wanted& wanted = {});
 
-/// Reads a store too large for memory, problem by problem: warnings compare only records of one
-/// problem.
+/// Reads a store too large for memory by problem: warnings compare records of one problem.
 class ProblemReader {
  public:
   /// Scans the lines and keeps 16 bytes of each, and about 60 bytes of each problem.
@@ -97,8 +95,7 @@ class ProblemReader {
 
   std::size_t records() const { return lines_.size(); }
   std::uint64_t bytes() const { return bytes_; }  ///< total length of their lines
-  /// First record of each set of keys in the store, omitted or not: columns and conditions may use
-  /// these keys.
+  /// First record of each set of keys, omitted or not: columns and conditions may use these keys.
   const std::vector<Record>& samples() const { return samples_; }
 
   /// Passes on all records of several problems at a time, a few thousand, problems in the order of
@@ -176,13 +173,11 @@ class MergedStores {
 /// Returns a store's file: `path` itself if it ends in ".jsonl", else results.jsonl in that folder.
 std::filesystem::path StoreFile(const std::filesystem::path& path);
 
-/// True if the file of a store is too large to hold in memory (32 MiB and more). Readers then load
-/// as few records as possible.
+/// True for files from 32 MiB on. Readers then load as few records as possible.
 bool IsLarge(const std::filesystem::path& file);
 
 /// Appends records to a file of JSON Lines. Lines are never changed, and a record is on disk when
-/// Append() returns. One process at a time: the file itself is locked, under any name, and the lock
-/// ends with the process.
+/// Append() returns. One process at a time: the file is locked until the process ends.
 class ResultStore {
  public:
   /// Opens `path` for appending and makes missing folders. A path that ends in ".jsonl" is the file
@@ -236,8 +231,7 @@ std::vector<Record> ReadRecords(const std::filesystem::path& path,
 /// True if conditions select lines of a store: some are on parameters of a sweep.
 bool ChoosesLines(const Selection& where);
 
-/// Returns a test whether a line may meet the conditions on parameters of a sweep. Other lines are
-/// skipped without parsing.
+/// Returns a test whether a line may meet conditions on parameters of a sweep, without parsing.
 LineReader::Wanted LinesThatMayMatch(const Selection& where);
 
 /// Called after each record with the number of records and their total line length; may throw.
@@ -302,8 +296,7 @@ bool IsLocked(const std::filesystem::path& file);
 /// True if `file` still names the open file of the descriptor: it was not deleted or replaced.
 bool IsStillNamed(int descriptor, const std::filesystem::path& file);
 
-/// Returns the file of the records of a NewStore until the store is complete, next to the store's
-/// file.
+/// Returns the file of a NewStore's records until it is complete, next to the store's file.
 std::filesystem::path UnderWay(const std::filesystem::path& store_file);
 
 /// True if the store has a record. An empty file remains after a run without records.

@@ -1,14 +1,11 @@
 #include <fcntl.h>
-#include <fmt/format.h>
 #include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
 #include <cerrno>
-#include <chrono>
 #include <fstream>
 #include <sstream>
-#include <stdexcept>
 #include <thread>
 
 #include "harness/base/store.h"
@@ -62,8 +59,7 @@ fs::path FirstMissingAbove(const fs::path& file) {
   return missing;
 }
 
-/// Throws if it is a circular link, or a link into a missing folder: its disk may be missing, so no
-/// folder is made.
+/// Throws for a circular link, or one into a missing folder: its disk may be missing.
 void RequireTarget(const fs::path& file) {
   if (!fs::is_symlink(fs::symlink_status(file))) return;
   const fs::path target = BehindLinks(file);

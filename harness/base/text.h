@@ -1,4 +1,5 @@
 // Texts and files: words, escapes, hashes, terminals, external programs, times of a process.
+// Sources that include this header rely on its standard headers.
 #pragma once
 
 #include <fmt/format.h>
@@ -114,13 +115,11 @@ std::string EscapeMarkdown(std::string_view text);
 /// Escapes a paragraph whose first characters must not make it a heading, list or quotation.
 std::string EscapeMarkdownParagraph(std::string_view text);
 
-/// Escapes all special characters of LaTeX text in a cell or a comment. Characters that pdflatex
-/// lacks without further packages are written as "(U+6F22)"; it has the accented letters of
-/// Latin-1.
+/// Escapes LaTeX text in a cell or a comment. Characters that pdflatex lacks without packages are
+/// written as "(U+6F22)"; it has the accented letters of Latin-1.
 std::string EscapeLatex(std::string_view text);
 
-/// Escapes LaTeX text that is set in lines: a word may break after punctuation, and after eight
-/// letters.
+/// Escapes LaTeX text set in lines: words may break after punctuation and after eight letters.
 std::string BreakableLatex(std::string_view text);
 
 /// Escapes text of SVG and HTML, in an element or an attribute.
@@ -171,10 +170,15 @@ class SystemFault : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
+/// Permission to write a file that the command has read, or a file of a store: for records of runs,
+/// never for a result.
+enum class Onto { kNoInput, kAnyFile };
+
 /// Writes `text` to `path` by the rules below: a reader of a regular file finds the old
 /// contents or the new ones, never a part. Makes missing parent folders. Throws std::runtime_error
 /// with the path and the system's reason.
-void WriteFileAtomically(const std::filesystem::path& path, std::string_view text);
+void WriteFileAtomically(const std::filesystem::path& path, std::string_view text,
+                         Onto onto = Onto::kNoInput);
 
 /// Writes `text` to `path` if no file exists there; else returns false and changes nothing. If
 /// several processes try at once, one succeeds. If a process is killed, the file is complete or
@@ -193,6 +197,13 @@ void WriteAll(int descriptor, std::string_view text, const std::filesystem::path
 
 /// Waits until the names in the folder of `path` are on disk, if the file system supports this.
 void SyncFolderOf(const std::filesystem::path& path);
+
+/// Calls use() for the parts of a file of any size, in order. Throws as FailOn() does.
+void ForEachBlock(const std::filesystem::path& file,
+                  const std::function<void(std::string_view)>& use);
+
+/// Returns the paths of all entries of a folder in order; none if it cannot be listed.
+std::vector<std::filesystem::path> EntriesOf(const std::filesystem::path& folder);
 
 /// Returns the bytes of the regular file `path` (a device might never end) and notes it as
 /// input. Throws std::runtime_error with the path and the reason.
@@ -245,6 +256,8 @@ class TemporaryFolder {
 //   a character device, a pipe      into it
 //   standard output or error        into it, after all previous output
 //   a file the command has read     nowhere: rejected
+//   a trajectory, mechanism or      nowhere: rejected
+//   reference of any store
 //   a folder, a block device, ...   nowhere: rejected
 
 /// Scope in which the files passed to NoteInput() are inputs, and output onto them is rejected.
@@ -258,9 +271,6 @@ class CommandInputs {
 };
 /// Registers an input file; every function that reads files calls it. Thread-safe.
 void NoteInput(const std::filesystem::path& path);
-
-/// Permission to write a file that the command has read: for its own records, never for a result.
-enum class Onto { kNoInput, kAnyFile };
 
 /// Throws as OutputFile does, and writes nothing: a check before long work.
 void RequireOutput(const std::filesystem::path& path);
@@ -299,8 +309,7 @@ class OutputFile {
   int descriptor_ = -1;
 };
 
-// Versions of files (docs/release.md). A version is raised if an old program could misread a new
-// file, or a new program an old file.
+// Versions of files (docs/release.md), raised if programs could misread older or newer files.
 
 /// Configuration files; those without a version read as 1.
 inline constexpr int kFileFormat = 1;
@@ -310,8 +319,7 @@ inline constexpr int kRecordFormat = 2;
 /// Expected format in messages.
 inline constexpr const char* kExpectedFormat = "{}, the format that this version reads";
 
-/// FNV-1a (64 bit) of bytes that come in parts: short names of states, cases and versions. For
-/// finding equal data, not for security.
+/// FNV-1a (64 bit) of bytes in parts: names of states, cases and versions, not for security.
 class FnvHash {
  public:
   void Add(std::string_view bytes) {
@@ -446,8 +454,7 @@ std::string Formatted(fmt::format_string<PrintedAs<Values>...> format, const Val
 
 }  // namespace internal
 
-/// Prints for people: texts among the values, from any source, are shown and never act on the
-/// terminal (EscapeTerminal).
+/// Prints for people: texts among the values never act on the terminal (EscapeTerminal).
 template <typename... Values>
 void Print(fmt::format_string<internal::PrintedAs<Values>...> format, const Values&... values) {
   PrintMessage(internal::Formatted<Values...>(format, values...));
@@ -498,6 +505,26 @@ template <class T>
 void AddOnce(std::vector<T>& list, const std::type_identity_t<T>& value) {
   if (!Contains(list, value)) list.push_back(value);
 }
+
+/// Returns the number that all of `text` is, as std::from_chars reads it.
+template <class Number, class... Base>
+std::optional<Number> WholeNumber(std::string_view text, Base... base) {
+  Number number{};
+  const char* const text_end = text.data() + text.size();
+  const auto [end, error] = std::from_chars(text.data(), text_end, number, base...);
+  return error == std::errc() && end == text_end ? std::optional(number) : std::nullopt;
+}
+
+/// Returns the two numbers of "a/b", as far as they are numbers.
+template <class Number>
+std::pair<std::optional<Number>, std::optional<Number>> Quotient(std::string_view text) {
+  const std::size_t bar = text.find('/');
+  if (bar == text.npos) return {};
+  return {WholeNumber<Number>(text.substr(0, bar)), WholeNumber<Number>(text.substr(bar + 1))};
+}
+
+/// Returns the length of the first character of a UTF-8 text [bytes], or 0 if it is invalid.
+std::size_t CharacterLength(std::string_view text);
 
 /// True if a byte of UTF-8 continues the character before it.
 inline bool ContinuesCharacter(char byte) {

@@ -148,16 +148,6 @@ std::string RenderKept(Table table, const std::string& format);
 /// Rejects an output that is named like a picture, unless it is an existing folder.
 void RejectPictures(const std::filesystem::path& out, const char* expected);
 
-/// Draws figures into a folder, as svg or pdf. Returns 2 and prints the reasons if some cannot be
-/// drawn.
-int DrawAll(const std::vector<NamedFigure>& figures, const std::filesystem::path& folder,
-            const std::string& format, FigureSize size);
-
-/// Returns the size "one-column" or "two-column".
-inline FigureSize SizeNamed(const std::string& name) {
-  return name == "one-column" ? FigureSize::kOneColumn : FigureSize::kTwoColumn;
-}
-
 /// Largest number of records held in memory: about 400 MB for runs of a few hundred steps.
 inline constexpr std::size_t kMaxHeld = 50'000;
 
@@ -212,15 +202,14 @@ struct ExplainView {
   JsonObject* document = nullptr;
   bool statics = false;    ///< forces that hold the start, too
   std::string range = "";  ///< name of a joint: the range of its coordinate, too
-};
 
-/// Prints a sentence for people, unless there is a document.
-template <typename... Values>
-void PrintUnlessJson(const ExplainView& view,
-                     fmt::format_string<internal::PrintedAs<Values>...> format,
-                     const Values&... values) {
-  if (view.document == nullptr) Print<Values...>(format, values...);
-}
+  /// Prints a sentence for people, unless there is a document.
+  template <typename... Values>
+  void Print(fmt::format_string<internal::PrintedAs<Values>...> format,
+             const Values&... values) const {
+    if (document == nullptr) harness::Print<Values...>(format, values...);
+  }
+};
 
 /// Prints a title and an indented table, as wide as the terminal. Without a terminal, breaks the
 /// last column into lines that end at 100 characters. In a document, stores all rows under `key`,
@@ -274,38 +263,6 @@ struct ProblemModels {
 ProblemModels MakeModels(const MechanismFile& file,
                          const std::vector<const SimplificationRule*>& ideas, const ShortRun& run,
                          const SimplifyOptions& options);
-
-/// Runs all models for `horizon` seconds with small steps, each with at most `cpu_s`, and sets
-/// their errors.
-void MeasureErrors(double horizon, double cpu_s, ProblemModels* ladder);
-
-/// Returns names of bodies of the full model that the other lacks.
-std::vector<std::string> RemovedBodies(const MechanismDescription& whole,
-                                       const MechanismDescription& simplified);
-
-/// Name of the experiment file that runs all models: NAME-ladder.json.
-std::string LadderFileName(const ProblemModels& ladder);
-
-/// Writes NAME.json of all models, the experiment and models.md: complete or not at all. With
-/// `force` they atomically replace files in an existing folder.
-/// @throws ConfigError if the folder exists and is not empty, unless `force`
-void WriteModels(const ProblemModels& ladder, double horizon, const std::string& typed,
-                 const std::filesystem::path& folder, bool force);
-
-struct ModelQuestion {
-  double horizon = 0.0;  ///< [s]
-  double accept = 0.0;   ///< largest acceptable error of a model [m]
-  double cpu_s = 0.0;    ///< limit of one integration [s]
-  std::string what;      ///< "my.json: --store", for messages
-};
-
-/// Returns a record of kind "model" (docs/reference/records.md) per model. All run alike (O-DCA,
-/// level projection, joint coordinates, ode45 at 1e-8), without observers and in turn. The error of
-/// a model is the largest distance of a named point between its certified motion and the full
-/// model's. Acceptance adds both certificates to the error. A model that cannot be judged is
-/// rejected with the reason.
-std::vector<Record> RecordsOfModels(const MechanismFile& file, const ProblemModels& models,
-                                    const ModelQuestion& question);
 
 // Certified motion of a mechanism: the reference for advice and models.
 

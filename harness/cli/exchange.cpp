@@ -1,26 +1,13 @@
 // view, import, export-mechanism, generate: mechanisms as pictures, and for other programs.
-#include <fmt/format.h>
-
-#include <algorithm>
-#include <charconv>
-#include <cmath>
-#include <filesystem>
 #include <sstream>
-#include <string>
-#include <vector>
 
-#include "harness/base/record.h"
-#include "harness/base/text.h"
-#include "harness/cli/command_line.h"
 #include "harness/cli/commands.h"
 #include "harness/config/formulations.h"
-#include "harness/config/mechanism_reader.h"
 #include "harness/exchange/export_c.h"
 #include "harness/exchange/import.h"
 #include "harness/exchange/model.h"
 #include "harness/figures/view.h"
 #include "harness/integrator/arkode.h"
-#include "harness/run/processes.h"
 #include "harness/run/run.h"
 #include "mechanism/start/assembly.h"
 

@@ -45,36 +45,33 @@ Table LoopTable(const MechanismDescription& description, const Structure& struct
 void PrintFreedom(const Structure& s, const std::vector<std::string>& idle,
                   const ExplainView& view) {
   const int each = s.space == SpaceKind::kPlanar ? 3 : 6;
-  PrintUnlessJson(view, "\nDegrees of freedom\n");
-  PrintUnlessJson(view, "  {} by counting (Gruebler, Kutzbach): {} bodies x {} - {} constraints\n",
-                  s.counted_freedom, s.bodies, each, s.rows);
+  view.Print("\nDegrees of freedom\n");
+  view.Print("  {} by counting (Gruebler, Kutzbach): {} bodies x {} - {} constraints\n",
+             s.counted_freedom, s.bodies, each, s.rows);
   if (!s.analysed) return;
-  PrintUnlessJson(
-      view, "  {} by rank: {} speeds of the tree - rank {} of the {} constraints of loops{}\n",
-      s.joint_u - s.rank_nearby, s.joint_u, s.rank_nearby, s.loop_rows,
-      s.couplings > 0 ? " and couplings" : "");
-  for (const std::string& one : idle) PrintUnlessJson(view, "  1 of them idle: {}\n", one);
+  view.Print("  {} by rank: {} speeds of the tree - rank {} of the {} constraints of loops{}\n",
+             s.joint_u - s.rank_nearby, s.joint_u, s.rank_nearby, s.loop_rows,
+             s.couplings > 0 ? " and couplings" : "");
+  for (const std::string& one : idle) view.Print("  1 of them idle: {}\n", one);
   if (s.locked() && s.freedom_at_start() > 0) {
-    PrintUnlessJson(view,
-                    "  0 finite motions: the start is singular, and its first-order motions\n"
-                    "  lead back to it\n");
+    view.Print(
+        "  0 finite motions: the start is singular, and its first-order motions\n"
+        "  lead back to it\n");
     return;
   }
   if (s.freedom_of_parts) {
-    PrintUnlessJson(view, "  {} finite motions: a part cannot move, see Warnings\n",
-                    *s.freedom_of_parts);
+    view.Print("  {} finite motions: a part cannot move, see Warnings\n", *s.freedom_of_parts);
     return;
   }
   if (s.freedom_at_start() != s.freedom()) {
-    PrintUnlessJson(view, "  {} at the start, a singular configuration of rank {}\n",
-                    s.freedom_at_start(), s.rank);
+    view.Print("  {} at the start, a singular configuration of rank {}\n", s.freedom_at_start(),
+               s.rank);
   }
   if (s.rank > 0 && s.singular_values.size() == 0) {
-    PrintUnlessJson(view, "  all constraints are independent at the start, by sparse pivots\n");
+    view.Print("  all constraints are independent at the start, by sparse pivots\n");
   } else if (s.rank > 0) {
-    PrintUnlessJson(
-        view, "  scaled singular values at the start: {:.3g} largest, {:.3g} smallest nonzero\n",
-        s.singular_values[0], s.singular_values[s.rank - 1]);
+    view.Print("  scaled singular values at the start: {:.3g} largest, {:.3g} smallest nonzero\n",
+               s.singular_values[0], s.singular_values[s.rank - 1]);
   }
 }
 
@@ -84,26 +81,25 @@ void PrintRedundant(const MechanismDescription& description, const Structure& st
   const int listed = static_cast<int>(structure.redundant.size());
   const int rest = structure.loop_rows - structure.rank_nearby - listed;
   const int implied = structure.couplings > 0 ? std::max(rest, 0) : 0;
-  PrintUnlessJson(view, "\nRedundant constraints: {}\n", listed + implied);
+  view.Print("\nRedundant constraints: {}\n", listed + implied);
   if (implied > 0) {
-    PrintUnlessJson(view, "  couplings: {} of them follow from other constraints at the start\n",
-                    implied);
+    view.Print("  couplings: {} of them follow from other constraints at the start\n", implied);
   }
-  bool released = false;
+  bool released = false, has_coupling = false;
   for (const RedundantDirection& one : structure.redundant) {
-    PrintUnlessJson(view, "  {}: {}{}\n", description.joints[one.joint].name, one.name,
-                    one.released ? "" : " (at the start)");
+    has_coupling = has_coupling || one.coupling >= 0;
+    view.Print("  {}: {}{}\n", description.joints[one.joint].name, one.name,
+               one.released ? "" : " (at the start)");
     released = released || one.released;
   }
   if (!released) return;
-  PrintUnlessJson(view, "  All of them can be removed at once; the motion stays the same.\n");
+  view.Print("  {} can be removed at once; the motion stays the same.\n",
+             has_coupling ? "All directions of joints" : "All of them");
   if (structure.rounding > 0.0) {
-    PrintUnlessJson(
-        view, "  They are redundant within {:.2g} lengths: a run removes them (\"accuracy\").\n",
-        structure.rounding);
+    view.Print("  They are redundant within {:.2g} lengths: a run removes them (\"accuracy\").\n",
+               structure.rounding);
   } else {
-    PrintUnlessJson(
-        view,
+    view.Print(
         "  They are redundant at every position: a run keeps the rank of the constraints and "
         "observes all\n  (\"preprocess\": \"redundancy\").\n");
   }
@@ -165,7 +161,7 @@ int PrintStatics(const MechanismDescription& description, const Structure& struc
   const Statics statics = FindStatics(description, structure.start);
   if (view.document != nullptr) view.document->Add("statics_message", statics.why);
   if (!statics.why.empty()) {
-    PrintUnlessJson(view, "\nForces at rest: none, {}\n", statics.why);
+    view.Print("\nForces at rest: none, {}\n", statics.why);
     return 2;
   }
   double largest = 0.0;
@@ -217,16 +213,15 @@ int PrintStatics(const MechanismDescription& description, const Structure& struc
   }
   PrintSection("Efforts that hold the start at rest", efforts, view, "efforts_at_rest");
   PrintSection("Reactions at rest", reactions, view, "reactions_at_rest");
-  PrintUnlessJson(
-      view,
+  view.Print(
       "  Ground axes, on the body \"on\" at the joint's point; efforts and joint forces are not in "
       "them.\n");
   if (std::ranges::any_of(statics.values, [](double value) { return std::isnan(value); })) {
-    PrintUnlessJson(view, "  not unique: redundant constraints share the load in no one way.\n");
+    view.Print("  not unique: redundant constraints share the load in no one way.\n");
   }
   if (statics.free > 0) {
-    PrintUnlessJson(view, "  {} that no force drives {} not held.\n",
-                    WithCount(statics.free, "motion"), statics.free == 1 ? "is" : "are");
+    view.Print("  {} that no force drives {} not held.\n", WithCount(statics.free, "motion"),
+               statics.free == 1 ? "is" : "are");
   }
   return 0;
 }
@@ -244,7 +239,7 @@ int PrintRange(const MechanismDescription& description, const ExplainView& view)
   const CoordinateRange range = FindRange(description, joint);
   if (view.document != nullptr) view.document->Add("range_message", range.why);
   if (!range.why.empty()) {
-    PrintUnlessJson(view, "\nRange of {}: none, {}\n", view.range, range.why);
+    view.Print("\nRange of {}: none, {}\n", view.range, range.why);
     return 2;
   }
   const ValueWord word =
@@ -397,20 +392,18 @@ void PrintStart(const MechanismDescription& description, const Start<double>& st
     view.document->Add("energy", JsonOf("kinetic", energy.kinetic, "potential", energy.potential,
                                         "total", energy.total()));
   }
-  PrintUnlessJson(view, "  Energy: kinetic {} J + potential {} J = {} J\n",
-                  ShortNumber(energy.kinetic), ShortNumber(energy.potential),
-                  ShortNumber(energy.total()));
-  PrintUnlessJson(
-      view,
+  view.Print("  Energy: kinetic {} J + potential {} J = {} J\n", ShortNumber(energy.kinetic),
+             ShortNumber(energy.potential), ShortNumber(energy.total()));
+  view.Print(
       "  Zero potential: centres of mass and constant forces at the ground's origin, springs at "
       "rest,\n  joint torques at coordinate 0.\n");
 }
 
 /// Prints lines under a title, or "none".
 void PrintLines(const char* title, const std::vector<std::string>& lines, const ExplainView& view) {
-  PrintUnlessJson(view, "\n{}\n", title);
-  if (lines.empty()) PrintUnlessJson(view, "  none\n");
-  for (const std::string& line : lines) PrintUnlessJson(view, "  {}\n", line);
+  view.Print("\n{}\n", title);
+  if (lines.empty()) view.Print("  none\n");
+  for (const std::string& line : lines) view.Print("  {}\n", line);
 }
 
 }  // namespace
@@ -428,8 +421,8 @@ int ExplainMechanism(const std::filesystem::path& path, const ExplainView& view)
         std::vector<double>(description.gravity.begin(), description.gravity.end()));
     DescribeStructure(description, structure, idle, view.document);
   }
-  PrintUnlessJson(view, "{} ({})\n  {} mechanism; lengths in m, angles in rad\n", description.name,
-                  path.string(), ToString(description.space));
+  view.Print("{} ({})\n  {} mechanism; lengths in m, angles in rad\n", description.name,
+             path.string(), ToString(description.space));
   PrintModel(description, structure, view);
   if (description.space == SpaceKind::kPlanar) {
     PrintStart<Planar>(description, structure.start, view);
@@ -445,9 +438,8 @@ int ExplainMechanism(const std::filesystem::path& path, const ExplainView& view)
   const Compiled compiled = Compile(description, CompileOptions::All());
   PrintLines("Possible simplifications", compiled.report, view);
   if (compiled.done != CompileOptions::None()) {
-    PrintUnlessJson(view,
-                    "  Applicable: {}. Default of a run: {} (\"preprocess\" of an experiment).\n",
-                    ToString(compiled.done), ToString(CompileOptions()));
+    view.Print("  Applicable: {}. Default of a run: {} (\"preprocess\" of an experiment).\n",
+               ToString(compiled.done), ToString(CompileOptions()));
   }
   if (view.document != nullptr) {
     Put(*view.document, "simplifications", compiled.report, "warnings", warnings, "hints", hints);

@@ -200,18 +200,16 @@ Table CouplingTable(const MechanismDescription& description) {
 void PrintModel(const MechanismDescription& description, const Structure& structure,
                 const ExplainView& view) {
   const bool planar = description.space == SpaceKind::kPlanar;
-  PrintUnlessJson(view, "  gravity ({}) m/s^2 in ground axes\n",
-                  VectorText(description.gravity, description.space));
+  view.Print("  gravity ({}) m/s^2 in ground axes\n",
+             VectorText(description.gravity, description.space));
   PrintSection("Bodies", BodyTable(description, structure), view, "bodies");
-  PrintUnlessJson(view,
-                  "  Points and com are relative to the body's origin; inertia is about com.\n");
-  if (!planar) PrintUnlessJson(view, "  Inertia is Ixx Iyy Izz, and Ixy Ixz Iyz unless zero.\n");
+  view.Print("  Points and com are relative to the body's origin; inertia is about com.\n");
+  if (!planar) view.Print("  Inertia is Ixx Iyy Izz, and Ixy Ixz Iyz unless zero.\n");
   PrintSection("Joints", JointTable(description, structure), view, "joints");
   PrintSection("Frames of joints",
                planar ? FrameTable<Planar>(description) : FrameTable<Spatial>(description), view,
                "frames");
-  PrintUnlessJson(
-      view,
+  view.Print(
       "  Origin, axis and rotation vector are in body axes. Coordinates describe M relative to "
       "F.\n");
   if (!description.couplings.empty()) {

@@ -1,16 +1,11 @@
 // schema and migrate: keys of files of each kind, and of earlier versions.
 #include <unistd.h>
 
-#include <exception>
 #include <fstream>
-#include <ranges>
-#include <stdexcept>
 
 #include "harness/base/json_document.h"
-#include "harness/base/store.h"
 #include "harness/cli/commands.h"
 #include "harness/config/file_schemas.h"
-#include "harness/judge/judge.h"
 #include "harness/judge/rule_schemas.h"
 
 namespace loopbench::harness {

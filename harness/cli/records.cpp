@@ -207,21 +207,6 @@ std::string RenderKept(Table table, const std::string& format) {
   return Render(table, format);
 }
 
-int DrawAll(const std::vector<NamedFigure>& figures, const std::filesystem::path& folder,
-            const std::string& format, FigureSize size) {
-  std::size_t written = 0;
-  for (const NamedFigure& figure : figures) {
-    const auto path = folder / (FileName(figure.name) + "." + format);
-    const auto error = WriteFigure(path, figure.figure, size);
-    if (error) PrintError("{}\n", Lines{*error});
-    written += error ? 0 : 1;
-  }
-  const bool all = written == figures.size();
-  Print("wrote {}{} to {}\n", all ? "" : fmt::format("{} of ", written),
-        WithCount(figures.size(), "figure"), folder.string());
-  return all ? 0 : 2;
-}
-
 void WriteTables(const std::vector<Record>& records, const std::filesystem::path& store,
                  const std::string& typed) {
   const bool is_file = store.extension() == ".jsonl";

@@ -99,6 +99,28 @@ struct WorkPrecisionCommand {
   }
 };
 
+/// Returns the size "one-column" or "two-column".
+FigureSize SizeNamed(const std::string& name) {
+  return name == "one-column" ? FigureSize::kOneColumn : FigureSize::kTwoColumn;
+}
+
+/// Draws figures into a folder, as svg or pdf. Returns 2 and prints the reasons if some cannot be
+/// drawn.
+int DrawAll(const std::vector<NamedFigure>& figures, const std::filesystem::path& folder,
+            const std::string& format, FigureSize size) {
+  std::size_t written = 0;
+  for (const NamedFigure& figure : figures) {
+    const auto path = folder / (FileName(figure.name) + "." + format);
+    const auto error = WriteFigure(path, figure.figure, size);
+    if (error) PrintError("{}\n", Lines{*error});
+    written += error ? 0 : 1;
+  }
+  const bool all = written == figures.size();
+  Print("wrote {}{} to {}\n", all ? "" : fmt::format("{} of ", written),
+        WithCount(figures.size(), "figure"), folder.string());
+  return all ? 0 : 2;
+}
+
 /// Returns --out if it ends like a figure file; else it is a folder.
 std::filesystem::path FileOf(const PlotCommand& command) {
   const std::filesystem::path& out = command.out;
@@ -184,7 +206,7 @@ int WriteMap(const RobustnessMap& map, const MapCommand& command, const std::str
                       RenderKept(WithProvenance(MapCellTable(map), typed), "csv"));
   WriteFileAtomically(stem.string() + ".md", MapMarkdown(map, Provenance(typed)));
   const std::string picture = stem.string() + "." + command.format;
-  const auto error = WriteMapFigure(picture, map, SizeNamed(command.size));
+  const auto error = DrawWithGnuplot(picture, DrawMap(map, SizeNamed(command.size)));
   if (error) PrintError("{}\n", Lines{*error});
   Print("wrote {0}.csv, {0}.md{1}\n", stem.string(), error ? "" : ", " + picture);
   return error ? 2 : 0;
@@ -199,7 +221,7 @@ int RedrawMap(const MapRules& rules, const MapCommand& command) {
   }
   const RobustnessMap map = MapFromCsv(rules, ReadTextFile(command.store), command.store.string());
   const std::string picture = (command.out / ("robustness-map." + command.format)).string();
-  RequireWritten(WriteMapFigure(picture, map, SizeNamed(command.size)), picture);
+  RequireWritten(DrawWithGnuplot(picture, DrawMap(map, SizeNamed(command.size))), picture);
   return 0;
 }
 
@@ -354,7 +376,7 @@ int PrintWorkPrecision(const WorkPrecisionCommand& command, const Typed& typed) 
     PrintText(ToScreen(WithProvenance(std::move(overview), typed.line)) + "\n");
     Print("wrote {0}.csv, {0}-overview.csv, {0}.md\n", stem);
   } else {
-    rows.notes.insert(rows.notes.end(), fairness.begin(), fairness.end());
+    rows.AddNotes(fairness);
     PrintText(RenderKept(WithProvenance(std::move(rows), typed.line), command.format));
   }
   if (!command.draws) return 0;

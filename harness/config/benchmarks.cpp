@@ -1,10 +1,6 @@
 #include "harness/config/benchmarks.h"
 
-#include <fmt/format.h>
-
 #include <set>
-#include <stdexcept>
-#include <system_error>
 
 #include "harness/base/text.h"
 #include "harness/config/experiment_sections.h"

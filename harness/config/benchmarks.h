@@ -12,8 +12,7 @@
 
 namespace loopbench::harness {
 
-/// Family of mechanisms of any size (mechanism/description/library.h), for benchmarks and for
-/// timings of experiments.
+/// Family of mechanisms of any size (mechanism/description/library.h), for benchmarks and timings.
 struct SizedFamily {
   std::string name;
   int smallest, largest;

@@ -11,7 +11,7 @@ namespace {
 
 template <class T>
 bool EmptyOrContains(const std::vector<T>& accepted, const T& value) {
-  return accepted.empty() || std::ranges::find(accepted, value) != accepted.end();
+  return accepted.empty() || Contains(accepted, value);
 }
 
 /// Step control of a case: a tolerance or a fixed step.
@@ -124,15 +124,12 @@ Record CaseKeys(const Experiment& experiment, const Case& one) {
     });
   }
   if (is_fixed) keys.Set("step", one.step);
-  const auto set = [&keys](bool matters, const char* key, auto value, auto usual) {
-    if (matters && value != usual) keys.Set(key, value);
-  };
-  const Integration& own = one.integration;
-  set(!is_fixed, "max_step", own.max_step, 0.0);
-  set(!is_fixed, "initial_step", own.initial_step, 0.0);
-  set(is_implicit, "max_newton_iterations", std::int64_t{own.max_newton_iterations},
-      std::int64_t{0});
-  set(is_implicit, "newton_coefficient", own.newton_coefficient, Integration().newton_coefficient);
+  const Json options = IntegrationFields().Write(one.integration);
+  for (const auto& [option, value] : options.items()) {
+    if (!UsesOption(option, is_implicit, is_fixed)) continue;
+    keys.Set(option, value.is_number_integer() ? Value(value.get<std::int64_t>())
+                                               : Value(value.get<double>()));
+  }
   keys.Set("horizon", one.horizon);
   if (one.method.gains) {
     keys.Set("alpha", one.method.gains->alpha);
@@ -160,7 +157,7 @@ void UseThreads(int threads, Experiment& experiment) {
     std::vector<Method> all;
     for (Method& method : methods) {
       if (!FindFormulation(method.formulation)->is_peer()) method.threads = threads;
-      if (std::ranges::find(all, method) == all.end()) all.push_back(method);
+      AddOnce(all, method);
     }
     methods = std::move(all);
   };

@@ -1,5 +1,4 @@
-// Experiment: mechanisms, methods, tolerances and horizons to run, and the keys of cases. Plain
-// data, filled by experiment_reader.h.
+// Experiment: mechanisms, methods, tolerances and horizons, as plain data (experiment_reader.h).
 #pragma once
 
 #include <array>
@@ -101,8 +100,7 @@ std::string ToString(const Method& method);
 /// Problem: a mechanism and its simulated times.
 struct ExperimentProblem {
   std::string name;  ///< the mechanism's name unless overridden; unique
-  /// Mechanism file, resolved against the experiment's folder; empty for a mechanism in the
-  /// experiment file or a member of a family.
+  /// Mechanism file, with the experiment's folder; empty for an included mechanism or a family.
   std::filesystem::path path;
   MechanismFile mechanism;
   std::vector<double> horizons;   ///< [s], different
@@ -140,8 +138,7 @@ struct Limits {
   double memory_mb = 2048.0;       ///< address space of the case's process [MiB]
 };
 
-/// A family of mechanisms of growing size (mechanism/description/library.h), timed per right-hand
-/// side only.
+/// A family of mechanisms of several sizes (library.h), timed per right-hand side only.
 struct TimingFamily {
   std::string family;      ///< a SizedFamily (harness/config/benchmarks.h)
   std::vector<int> sizes;  ///< sizes of its members
@@ -192,8 +189,7 @@ struct OutputOptions {
   int number = 0;               ///< number of rows, evenly from start to end; 0: not used
   std::vector<double> times;    ///< [s], ascending; times beyond a horizon are left out
   bool accepted_steps = false;  ///< the ends of the integrator's own steps
-  /// If true, integrator steps end at the times. If false, rows are taken from dense output, and
-  /// the run is unchanged.
+  /// True: steps end at the times. False: rows are of dense output, and the run is unchanged.
   bool exact = false;
   std::vector<OutputPart> quantities = {OutputPart::kJoints, OutputPart::kBodies,
                                         OutputPart::kPoints, OutputPart::kReactions,
@@ -214,16 +210,6 @@ struct AbsoluteTolerances {
   double speed = 0.0, angular_speed = 0.0;  ///< [m/s], [rad/s]
 
   std::array<double*, 4> All() { return {&length, &angle, &speed, &angular_speed}; }
-};
-
-/// Options of the integrator besides its method and tolerances (IntegratorOptions).
-struct Integration {
-  double max_step = 0.0;      ///< [s]; 0: the profile's own
-  double initial_step = 0.0;  ///< [s]; 0: the profile's own
-  int max_newton_iterations = 0;
-  double newton_coefficient = IntegratorOptions().newton_coefficient;
-
-  friend bool operator==(const Integration&, const Integration&) = default;
 };
 
 struct Experiment {
@@ -248,8 +234,7 @@ struct Experiment {
   Precision precision;
   std::optional<ReferenceOptions> reference;
   std::optional<OutputOptions> output;
-  /// Values of this combination of a sweep, by axis name. Every record contains them, for filters
-  /// and tables. Empty without a sweep.
+  /// Values of this combination of a sweep, by axis name, as in every record.
   Record parameters;
   std::vector<Selection> exclusions;  ///< matching cases are left out
 };
@@ -273,8 +258,7 @@ struct Case {
   std::vector<DrawnCoordinate> between = {};  ///< as in the rule
   double branch_bound = 1e-6;                 ///< [rad]
   Limits limits = {};
-  /// CaseKeys() of the case; for runs also "case_id" and "content" (harness/run/run.h).
-  /// They are written to the record unchanged.
+  /// CaseKeys() of the case, for the record; for runs also "case_id" and "content" (run.h).
   Record keys = {};
 };
 
@@ -300,8 +284,7 @@ void UseThreads(int threads, Experiment& experiment);
 /// integrator, tolerance, fixed step. Peers, which have own integrators, have one per tolerance.
 std::vector<Case> Expand(const Experiment& experiment);
 
-/// Returns one case per precision ladder except excluded cases, in the order problem, method; empty
-/// without scalars. Tolerances are in the ladder.
+/// Returns one case per precision ladder, except excluded ones, in the order problem, method.
 std::vector<Case> ExpandLadders(const Experiment& experiment);
 
 /// Returns all timing cases except excluded cases, in the order problem, method, integrator. With

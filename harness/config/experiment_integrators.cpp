@@ -1,7 +1,4 @@
 // Integrators of an experiment file: Butcher tables, absolute tolerances, limits of steps.
-#include <fmt/format.h>
-
-#include <charconv>
 
 #include "harness/base/text.h"
 #include "harness/config/experiment_sections.h"
@@ -17,16 +14,8 @@ struct TableDraft : ButcherTable {
 /// Reads a number, or a quotient of integers as text.
 double ReadCoefficient(const JsonNode& node) {
   if (!node.value().is_string()) return node.Number();
-  const std::string& text = node.value().get_ref<const std::string&>();
-  std::int64_t numerator = 0, denominator = 0;
-  const char* const end = text.data() + text.size();
-  const auto upper = std::from_chars(text.data(), end, numerator);
-  if (upper.ec == std::errc() && upper.ptr != end && *upper.ptr == '/') {
-    const auto lower = std::from_chars(upper.ptr + 1, end, denominator);
-    if (lower.ec == std::errc() && lower.ptr == end && denominator > 0) {
-      return static_cast<double>(numerator) / static_cast<double>(denominator);
-    }
-  }
+  const auto [upper, lower] = Quotient<std::int64_t>(node.value().get_ref<const std::string&>());
+  if (upper && lower > 0) return static_cast<double>(*upper) / static_cast<double>(*lower);
   node.Fail("a number, or a fraction of integers as text, such as \"-1/6\"");
   return 0.0;
 }
@@ -175,6 +164,11 @@ const Fields<Integration>& IntegrationFields() {
   return fields;
 }
 
+bool UsesOption(std::string_view option, bool is_implicit, bool is_fixed) {
+  if (option.ends_with("_step")) return !is_fixed;
+  return is_implicit || option.find("newton") == std::string_view::npos;
+}
+
 void RequireUseOfIntegrators(const JsonNode& node, ExperimentFile& file) {
   const auto integrator = node.Optional("integrator"), integration = node.Optional("integration");
   bool any_implicit = false;
@@ -185,11 +179,11 @@ void RequireUseOfIntegrators(const JsonNode& node, ExperimentFile& file) {
     integrator->FailAs(fmt::format("\"{}\", which has no embedding, beside \"tolerances\"", name),
                        "\"fixed_steps\" alone: without embedding there is no error estimate");
   }
-  for (const char* key : {"max_newton_iterations", "newton_coefficient"}) {
+  IntegrationFields().Show(Integration{}, [&](const std::string& key, const Json&) {
     const auto option = integration ? integration->Optional(key) : std::nullopt;
-    if (!option || any_implicit || file.integrators.empty()) continue;
+    if (!option || file.integrators.empty() || UsesOption(key, any_implicit, false)) return;
     option->FailAs("an option of implicit integrators", "an implicit integrator in \"integrator\"");
-  }
+  });
   for (const char* key : {"atol", "integration"}) {
     const auto option = node.Optional(key);
     if (!option || file.precision.scalars.empty()) continue;

@@ -1,9 +1,7 @@
 // Sections of an experiment: problems, families of mechanisms, ensembles of initial values.
-#include <fmt/format.h>
 
 #include <numbers>
 #include <set>
-#include <system_error>
 
 #include "harness/base/text.h"
 #include "harness/config/experiment_reader.h"
@@ -170,13 +168,11 @@ void ReadEnsembles(const JsonNode& node, ExperimentFile& experiment) {
   }
 }
 
-// Families of mechanisms (mechanism/description/library.h) as problems: {"family": "chain", "bars":
-// 10}.
+// Families of mechanisms (library.h) as problems: {"family": "chain", "bars": 10}.
 
 constexpr std::int64_t kMaxUnits = 100'000;  ///< bars, windows, storeys
 
-/// {"family": "chain", "bars": 10} and so on; `sizes` are bars or windows. Defaults of cranks are
-/// as in timing.
+/// `sizes` are bars or windows. Defaults of cranks are as in timing.
 struct Family {
   std::vector<std::int64_t> sizes, storeys;
   double angle = 1.0, speed = 1.0;
@@ -271,8 +267,7 @@ Json FamilySchema() {
                                        GridFields().Schema()}));
 }
 
-/// Returns all members of {"family": ...}, each with its counts as its name: "10", "3x4". `room` is
-/// the maximum number of bodies.
+/// Returns all members, named by their counts: "10", "3x4". `room`: maximum number of bodies.
 std::vector<ExperimentProblem> ReadFamilyMembers(const JsonNode& node, std::size_t room) {
   static const NameList kNames = {"chain", "ladder", "grid"};
   constexpr auto kMake = std::array{MakeChain, MakeLadder, MakeGrid};
@@ -350,8 +345,7 @@ void Resize(MechanismFile* mechanism, double factor) {
   mechanism->canonical += fmt::format(" at scale {}", factor);
 }
 
-/// Entry of "problems": several problems if a family has several counts. The base class contains
-/// the common values.
+/// Entry of "problems": its common values, and several problems for several counts of a family.
 struct ProblemEntry : ExperimentProblem {
   MechanismFiles* files = nullptr;
   std::size_t room = 0;  ///< maximum number of bodies
@@ -450,10 +444,7 @@ void ReadNamedFile(const JsonNode& node, const std::filesystem::path& path, std:
   }
   std::vector<std::string> beside;
   const std::filesystem::path folder = path.has_parent_path() ? path.parent_path() : ".";
-  for (const auto& entry : std::filesystem::directory_iterator(folder, error)) {
-    beside.push_back(entry.path().filename().string());
-  }
-  std::ranges::sort(beside);
+  for (const auto& entry : EntriesOf(folder)) beside.push_back(entry.filename().string());
   const std::string nearest = NearestSpelling(path.filename().string(), beside);
   const std::filesystem::path named = node.Text();
   node.Fail(fmt::format("{} ({} does not exist)", what, path.string()),

@@ -1,7 +1,5 @@
 #include "harness/config/experiment_reader.h"
 
-#include <fmt/format.h>
-
 #include <ranges>
 #include <set>
 
@@ -311,9 +309,7 @@ std::vector<std::size_t> ExperimentSource::EachValue(std::size_t most) const {
   return {combinations.begin(), combinations.end()};
 }
 
-std::string ExperimentSource::Text() const {
-  return document_->json.dump(-1, ' ', false, Json::error_handler_t::replace);
-}
+std::string ExperimentSource::Text() const { return CompactText(document_->json); }
 
 Experiment ExperimentSource::Read(std::size_t combination) {
   document_->sweep.Apply(combination, *document_);

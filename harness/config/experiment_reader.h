@@ -49,8 +49,7 @@ class ExperimentSource {
   /// Returns the number of combinations, including fully excluded combinations; 1 without a sweep.
   std::size_t count() const;
 
-  /// Returns names and numbers of values of all axes, the first axis slowest, axes of a zip one by
-  /// one.
+  /// Returns names and numbers of values of all axes, the slowest first, axes of a zip singly.
   std::vector<std::pair<std::string, std::size_t>> axes() const;
 
   /// Returns the values of a combination by axis, without reading the experiment.

@@ -68,8 +68,7 @@ void ReadNamedFile(const JsonNode& node, const std::filesystem::path& path, std:
 struct ExperimentFile : Experiment {
   MechanismFiles* files = nullptr;
 };
-/// Fields of the sections of the same names. A problem contains its mechanism; a family with
-/// several counts gives several problems.
+/// Fields of the sections of the same names. A family with several counts gives several problems.
 FieldValue<ExperimentFile> ProblemsValue();
 FieldValue<ExperimentFile> IntegratorsValue();
 FieldValue<ExperimentFile> AtolValue();
@@ -82,6 +81,9 @@ const Fields<Limits>& LimitsFields();
 const Fields<CompileOptions>& CompileFields();
 const Fields<AbsoluteTolerances>& AtolFields();
 const Fields<Integration>& IntegrationFields();
+/// Returns true if cases use this option: lengths of steps unless steps are fixed, options of
+/// Newton's iteration if the profile is implicit.
+bool UsesOption(std::string_view option, bool is_implicit, bool is_fixed);
 const Fields<Experiment>& SeriesFields();
 const Fields<Timing>& TimingFields();
 const Fields<Precision>& PrecisionFields();

@@ -1,7 +1,5 @@
 // Sections of an experiment: tolerances, limits, output, reference; and fields by pointer.
-#include <fmt/format.h>
 
-#include <charconv>
 #include <cmath>
 
 #include "harness/base/text.h"
@@ -180,11 +178,8 @@ void ReadReferenceOptions(const JsonNode& node, ExperimentFile& experiment) {
 
 /// Returns an index of a JSON Pointer.
 std::optional<std::size_t> IndexOf(const std::string& token) {
-  std::size_t index = 0;
-  const auto [end, error] = std::from_chars(token.data(), token.data() + token.size(), index);
-  const bool number = error == std::errc() && end == token.data() + token.size();
-  if (!number || (token.size() > 1 && token.front() == '0')) return std::nullopt;
-  return index;
+  const bool has_leading_zero = token.size() > 1 && token.front() == '0';
+  return has_leading_zero ? std::nullopt : WholeNumber<std::size_t>(token);
 }
 
 std::string PlaceName(const std::string& pointer) { return pointer.empty() ? "the file" : pointer; }
@@ -216,23 +211,16 @@ std::string NameInLimits(const Json& limits, const std::string& token) {
   return limits.contains(token) || !limits.contains(other) ? token : other;
 }
 
-/// Returns the tokens of a JSON Pointer, or nothing if it is invalid (no leading "/", "~" without 0
-/// or 1).
-std::optional<std::vector<std::string>> PointerTokens(const std::string& pointer) {
-  if (pointer.empty() || pointer.front() != '/') return std::nullopt;
+/// Returns the tokens of a JSON Pointer, or nothing if it is invalid or "".
+std::optional<std::vector<std::string>> PointerTokens(const std::string& pointer) try {
   std::vector<std::string> tokens;
-  for (std::size_t i = 0; i < pointer.size(); ++i) {
-    if (pointer[i] == '/') {
-      tokens.emplace_back();
-    } else if (pointer[i] != '~') {
-      tokens.back() += pointer[i];
-    } else if (i + 1 < pointer.size() && (pointer[i + 1] == '0' || pointer[i + 1] == '1')) {
-      tokens.back() += pointer[++i] == '0' ? '~' : '/';
-    } else {
-      return std::nullopt;
-    }
+  for (Json::json_pointer left(pointer); !left.empty(); left.pop_back()) {
+    tokens.push_back(left.back());
   }
-  return tokens;
+  std::ranges::reverse(tokens);
+  return tokens.empty() ? std::nullopt : std::optional(tokens);
+} catch (const Json::parse_error&) {
+  return std::nullopt;
 }
 
 /// Replaces the path of a mechanism file by the file's document.
@@ -281,10 +269,9 @@ void Walk(ExperimentDocument& document, Json& node, const std::vector<std::strin
     return;
   }
   if (!node.is_object()) {
-    found->fault = FieldFault{
-        fmt::format("no \"{}\" in {}, which is {}", token, PlaceName(pointer),
-                    node.dump(-1, ' ', false, Json::error_handler_t::replace).substr(0, 60)),
-        "a field of an object or array", "", ""};
+    found->fault = FieldFault{fmt::format("no \"{}\" in {}, which is {}", token, PlaceName(pointer),
+                                          CompactText(node).substr(0, 60)),
+                              "a field of an object or array", "", ""};
     return;
   }
   const std::string below = pointer + "/" + PointerToken(token);
@@ -292,8 +279,7 @@ void Walk(ExperimentDocument& document, Json& node, const std::vector<std::strin
     Walk(document, *member, tokens, depth + 1, below, found);
     return;
   }
-  // Points may have any name: a misspelt name would be created without effect. The content of a
-  // missing array is unknown.
+  // Points may have any name: a misspelt one would have no effect. A missing array is unknown.
   const bool free_names = depth > 0 && tokens[depth - 1] == "points";
   const bool in_array = std::any_of(
       tokens.begin() + static_cast<std::ptrdiff_t>(depth) + 1, tokens.end(),

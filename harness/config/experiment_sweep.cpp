@@ -12,17 +12,12 @@ namespace {
 
 constexpr std::size_t kMaxAxes = 100;
 
-/// Returns true for letters, digits, "_" and "-" after a letter: usable in --filter key=value. Dots
-/// are reserved for nested values of records.
+/// Returns true for letters, digits, "_" and "-" after a letter. Dots are for nested values.
 bool IsName(const std::string& text) {
   const auto letter = [](char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z'); };
   return !text.empty() && letter(text.front()) && std::ranges::all_of(text, [&](char c) {
     return letter(c) || (c >= '0' && c <= '9') || c == '_' || c == '-';
   });
-}
-
-std::string Compact(const Json& value) {
-  return value.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 
 /// Returns integers only if all values are integers: a table column has one type.
@@ -41,7 +36,7 @@ std::vector<Value> AsParameters(const std::vector<Json>& values) {
     } else if (value.is_boolean()) {
       parameters.emplace_back(value.get<bool>());
     } else {
-      parameters.emplace_back(value.is_string() ? value.get<std::string>() : Compact(value));
+      parameters.emplace_back(value.is_string() ? value.get<std::string>() : CompactText(value));
     }
   }
   return parameters;
@@ -125,10 +120,10 @@ void CheckDistinct(const JsonNode& node, const SweepGroup& group) {
     for (const SweepAxis& axis : group.axes) {
       const Json& value = axis.values[i];
       const bool is_whole = value.is_number_integer() && value == Json(value.get<double>());
-      all += Compact(Json(Compact(is_whole ? Json(value.get<double>()) : value)));
+      all += CompactText(Json(CompactText(is_whole ? Json(value.get<double>()) : value)));
     }
     if (known.insert(all).second) continue;
-    const std::string values = group.axes.size() == 1 ? Compact(group.axes.front().values[i])
+    const std::string values = group.axes.size() == 1 ? CompactText(group.axes.front().values[i])
                                                       : fmt::format("the values number {}", i);
     node.FailAs(values.substr(0, 60) + " again", "each value once");
   }

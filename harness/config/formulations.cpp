@@ -1,10 +1,6 @@
 #include "harness/config/formulations.h"
 
-#include <fmt/format.h>
-
-#include <algorithm>
 #include <array>
-#include <type_traits>
 
 #include "harness/base/text.h"
 #include "lagrange/lagrange.h"
@@ -25,8 +21,7 @@ FormulationRow PeerRow(std::string name, std::string sentence, Enforcement like,
   return row;
 }
 
-/// Returns built-in formulations, peers last. Colours by P. Tol (high contrast and others) also
-/// differ in lightness.
+/// Returns built-in formulations, peers last. Colours (P. Tol) also differ in lightness.
 std::deque<FormulationRow> BuiltIn() {
   return {
       Row<odca::Odca>("odca",

@@ -1,5 +1,4 @@
-// Registry of formulations by name, with their properties for readers, commands, tables and
-// figures.
+// Registry of formulations by name, with their properties for readers, tables and figures.
 //
 // Built-in formulations are rows of formulations.cpp. A program registers its own formulation
 // before loopbench::Main() (harness/cli/program.h; examples/own-formulation/):
@@ -68,8 +67,7 @@ FormulationRow Row(std::string name, std::string sentence, std::string color = {
 /// (mechanism/description/registration.h) or colour.
 void RegisterFormulation(FormulationRow row, int alignment = EIGEN_MAX_STATIC_ALIGN_BYTES);
 
-/// Returns all rows: built-in rows, then others in order of registration. References to rows stay
-/// valid.
+/// Returns all rows: built-in ones, then others as registered. References stay valid.
 const std::deque<FormulationRow>& Formulations();
 std::vector<std::string> FormulationNames();
 /// Returns names without peers, which have their own right-hand sides.

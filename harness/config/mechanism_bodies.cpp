@@ -1,5 +1,4 @@
 // Sections of a mechanism: bodies and joints.
-#include <fmt/format.h>
 
 #include <Eigen/Cholesky>
 #include <cmath>
@@ -37,8 +36,7 @@ Json PointsSchema() {
 }
 
 /// Reads the inertia. One number I becomes diag(I, I, I): in the plane only Izz matters, in space
-/// it is isotropic. Six numbers are the elements [Ixx, Iyy, Izz, Ixy, Ixz, Iyz] of the matrix as it
-/// stands.
+/// it is isotropic. Six numbers are the elements [Ixx, Iyy, Izz, Ixy, Ixz, Iyz].
 ///
 /// Principal moments satisfy the triangle inequality; for a thin rod or plate with equality. In the
 /// plane only Izz is used and the other moments are unknown.
@@ -85,6 +83,16 @@ Json WriteInertia(const BodyDescription& body, const Draft&) {
   return json;
 }
 
+/// Masses times squares of lengths must not overflow.
+void CheckSizes(const JsonNode& node, BodyDescription& body, const Draft&) {
+  constexpr double kLargest = 1e100;
+  const auto mass = node.Optional("mass"), inertia = node.Optional("inertia");
+  if (mass && body.mass >= kLargest) mass->Fail("a mass below 1e100 kg");
+  if (inertia && body.inertia.cwiseAbs().maxCoeff() >= kLargest) {
+    inertia->Fail("moments of inertia below 1e100 kg m^2");
+  }
+}
+
 const PartFields<BodyDescription>& BodyFields() {
   using Body = BodyDescription;
   static const Json inertia =
@@ -101,7 +109,8 @@ const PartFields<BodyDescription>& BodyFields() {
        {"com", Coded<Body>(&Body::com, VectorSchema(), ReadVector, UnlessZero<WriteVector>),
         "Centre of mass in body axes [m]; default: the body's origin."},
        {"points", Coded<Body>(&Body::points, PointsSchema(), ReadPoints, WritePoints),
-        "Named points in body axes, from the body's origin [m]."}});
+        "Named points in body axes, from the body's origin [m]."},
+       {"", By(Json::object(), CheckSizes)}});
   return fields;
 }
 
@@ -132,12 +141,21 @@ const PartFields<Side>& SideFields() {
   return fields;
 }
 
+constexpr double kZeroAxis = 1e-12;  ///< largest component of an axis that counts as zero
+
+/// Returns the schema of a vector that is not zero.
+Json AxisSchema() {
+  const Json zero = {{"items", {{"minimum", -kZeroAxis}, {"maximum", kZeroAxis}}}};
+  return {{"allOf", Json::array({VectorSchema(), {{"not", zero}}})},
+          {"words", VectorSchema()["words"]}};
+}
+
 void ReadAxis(const JsonNode& node, Joint& joint, const Draft& draft) {
   const Eigen::Vector3d axis = joint.axis = node.Vector();
   const JointType type = joint.type;
   if (TraitsOf(type).own_axis == '-') {
     node.Fail(fmt::format("no axis on a {} joint", ToString(type)));
-  } else if (axis.isZero()) {
+  } else if (axis.isZero(kZeroAxis)) {
     if (node.value().is_array()) node.Fail("an axis that is not zero");
   } else if (draft.space == SpaceKind::kPlanar) {
     const bool along_z = axis.x() == 0.0 && axis.y() == 0.0 && axis.z() > 0.0;
@@ -232,8 +250,7 @@ void ReadMotions(const JsonNode& node, Joint& joint, const Draft& draft) {
     joint.motions = {{0, ReadTimeFunction(node)}};
     return;
   }
-  if (node.value().empty()) node.Fail("at least one motion");
-  for (const JsonNode& element : node.Elements("motions")) {
+  for (const JsonNode& element : node.Elements("motions", "at least one motion")) {
     PrescribedMotion motion{0, Polynomial{{0.0}}};
     FieldsOfMotion().Read(element, &motion, joint, draft);
     joint.motions.push_back(motion);
@@ -297,7 +314,8 @@ void AddParameters(std::vector<PartField<Joint>>* rows) {
 }
 
 PartFields<Joint> MakeJointFields() {
-  const Json motions = EitherSchema({TimeFunctionSchema(), ArraySchema(FieldsOfMotion().Schema())});
+  const Json motions =
+      EitherSchema({TimeFunctionSchema(), ArraySchema(FieldsOfMotion().Schema(), 1)});
   std::vector<PartField<Joint>> rows = {
       {"name", NewName(&Joint::name, &Draft::joint_names), "Unique name of the joint.", "a name"},
       {"type", By(ChoiceSchema(JointTypeNames().all()), ReadType, WriteType), "Type of the joint.",
@@ -307,7 +325,7 @@ PartFields<Joint> MakeJointFields() {
       {"to", Object(&Joint::to, SideFields()), "Frame M of the joint.",
        "an object with keys \"body\", \"at\", \"rotation\""},
       {"", By(Json::object(), CheckSides)},
-      {"axis", By(VectorSchema(), ReadAxis, WriteAxis),
+      {"axis", By(AxisSchema(), ReadAxis, WriteAxis),
        "Axis, not zero. Default: x for prismatic, pin-in-slot and point-on-line joints, otherwise "
        "z."}};
   AddParameters(&rows);
@@ -331,14 +349,16 @@ const PartFields<Joint>& JointFields() {
 
 using Coupling = CouplingDescription;
 
+/// Limits of the sizes of coefficients: their squares must not overflow or vanish.
+constexpr double kSmallestRatio = 1e-100, kLargestRatio = 1e100;
+
 /// Reads {"joint": coefficient, ...}; the reader of files rejects a joint that appears twice.
 void ReadCoefficients(const JsonNode& node, Coupling& coupling, const Draft& draft) {
   if (!node.ExpectObject(draft.joint_names)) return;
   bool all_driven = true;
   for (const auto& [name, value] : node.Members()) {
     const double ratio = value.Number();
-    // squares must not overflow or vanish
-    const bool is_usable = std::abs(ratio) > 1e-100 && std::abs(ratio) < 1e100;
+    const bool is_usable = std::abs(ratio) > kSmallestRatio && std::abs(ratio) < kLargestRatio;
     if (!is_usable && value.value().is_number()) value.Fail("a size between 1e-100 and 1e100");
     const auto joint = draft.joint_names.Find(name);
     if (!joint) continue;
@@ -367,7 +387,9 @@ Json WriteCoefficients(const Coupling& coupling, const Draft& draft) {
 
 const PartFields<Coupling>& CouplingFields() {
   Json ratio = NumberSchema();
-  ratio["not"] = {{"const", 0}};
+  ratio["exclusiveMinimum"] = -kLargestRatio;
+  ratio["exclusiveMaximum"] = kLargestRatio;
+  ratio["not"] = {{"minimum", -kSmallestRatio}, {"maximum", kSmallestRatio}};
   Json coefficients = MapSchema(ratio);
   coefficients["minProperties"] = 2;
   static const PartFields<Coupling> fields(

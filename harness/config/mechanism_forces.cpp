@@ -1,5 +1,4 @@
 // Sections of a mechanism: forces, and functions of time.
-#include <fmt/format.h>
 
 #include "harness/base/text.h"
 #include "harness/config/mechanism_sections.h"

@@ -1,8 +1,5 @@
 #include "harness/config/mechanism_reader.h"
 
-#include <fmt/format.h>
-
-#include <algorithm>
 #include <set>
 
 #include "harness/base/text.h"
@@ -14,6 +11,8 @@ namespace loopbench::harness {
 
 Eigen::Vector3d ReadVector(const JsonNode& node, const Draft& draft) {
   const Eigen::Vector3d vector = node.Vector();
+  // moments of inertia contain squares, which must not overflow
+  if (!(vector.cwiseAbs().maxCoeff() < 1e100)) node.Fail("numbers of sizes below 1e100");
   if (draft.space == SpaceKind::kPlanar && vector.z() != 0.0) {
     node.FailWithCure(kSpatialCure, "z = 0 in a planar mechanism");
   }
@@ -463,7 +462,7 @@ MechanismFile ParseMechanism(std::string_view text, const std::string& file) {
 
 MechanismFile ReadMechanismObject(const JsonNode& root) {
   MechanismFile result;
-  result.canonical = root.value().dump(-1, ' ', false, Json::error_handler_t::replace);
+  result.canonical = CompactText(root.value());
   Draft draft;
   draft.bodies[kGround].name = "ground";
   draft.body_names.Add("ground");

@@ -52,8 +52,7 @@ const PartFields<ObservedQuantities>& ObservationFields();
 
 // Readers and writers of values. Writers return null for values that a file leaves out.
 
-/// Reads a number (a constant), or an object with "type" polynomial, harmonic or table. Returns a
-/// placeholder after an error.
+/// Reads a number (a constant) or an object with a "type". Returns a placeholder after an error.
 TimeFunctionDescription ReadTimeFunction(const JsonNode& node);
 /// Writes a function; a constant as a number.
 Json WriteTimeFunction(const TimeFunctionDescription& function);
@@ -94,8 +93,7 @@ auto ValueOf(const T& owner, const Get& get) {
   }
 }
 
-/// Field for the value that `get(owner)` refers to, by `read(node, draft)` and `write(value,
-/// draft)`.
+/// Field for the value of `get(owner)`, by `read(node, draft)` and `write(value, draft)`.
 template <class T, class Get, class Read, class Write>
 PartValue<T> Coded(Get get, Json schema, Read read, Write write) {
   return {std::move(schema),

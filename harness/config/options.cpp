@@ -1,12 +1,7 @@
 #include "harness/config/options.h"
 
-#include <fmt/format.h>
-
-#include <algorithm>
 #include <array>
 #include <cmath>
-#include <functional>
-#include <utility>
 
 #include "harness/base/text.h"
 #include "mechanism/description/registration.h"
@@ -86,8 +81,7 @@ struct Tree {
   std::vector<double> below = {};  ///< A weights: the factor of this tree as a branch
 };
 
-/// Calls `visit` for every rooted tree up to `order`, in order of the trees' orders, until it
-/// returns false.
+/// Calls `visit` for every rooted tree up to `order`, smaller ones first, until it returns false.
 void VisitTrees(const ButcherTable& table, int order,
                 const std::function<bool(const Tree&)>& visit) {
   const std::size_t stages = table.b.size();
@@ -227,48 +221,39 @@ std::string Validate(const IntegratorOptions& options) {
     return fmt::format("profile is \"{}\", which has no embedding; it needs a fixed_step",
                        options.profile);
   }
-  if (!(options.rtol > kMinTolerance && options.rtol < 1)) {
-    return fmt::format("rtol is {}; it must lie between {:.2g} and 1", options.rtol, kMinTolerance);
-  }
-  if (!(options.atol > 0 && options.atol <= std::numeric_limits<double>::max())) {
-    return fmt::format("atol is {}; it must be positive and finite", options.atol);
-  }
+  std::string fault;
+  const auto require = [&fault](bool is_valid, std::string_view key, const auto& value,
+                                std::string_view rule) {
+    if (!is_valid && fault.empty()) fault = fmt::format("{} {}; {}", key, value, rule);
+  };
+  const auto is_tolerance = [](double atol) {
+    return atol > 0 && atol <= std::numeric_limits<double>::max();
+  };
+  constexpr std::string_view kNoNegative = "it must not be negative";
+  require(options.rtol > kMinTolerance && options.rtol < 1, "rtol is", options.rtol,
+          fmt::format("it must lie between {:.2g} and 1", kMinTolerance));
+  require(is_tolerance(options.atol), "atol is", options.atol, "it must be positive and finite");
   for (const double atol : options.atols) {
-    if (!(atol > 0 && atol <= std::numeric_limits<double>::max())) {
-      return fmt::format("atols contain {}; they must be positive and finite", atol);
-    }
+    require(is_tolerance(atol), "atols contain", atol, "they must be positive and finite");
   }
-  if (options.step_limit < 1) {
-    return "step_limit is " + std::to_string(options.step_limit) + "; it must be at least 1";
-  }
-  if (!(options.time_limit_s > 0)) {
-    return "time_limit_s is " + std::to_string(options.time_limit_s) + "; it must be positive";
-  }
-  if (!(options.max_step >= 0)) {
-    return "max_step is " + std::to_string(options.max_step) + "; it must not be negative";
-  }
-  if (!(options.initial_step >= 0)) {
-    return fmt::format("initial_step is {}; it must not be negative", options.initial_step);
-  }
-  if (options.max_newton_iterations < 0) {
-    return fmt::format("max_newton_iterations is {}; it must not be negative",
-                       options.max_newton_iterations);
-  }
-  if (!(options.newton_coefficient > 0 && options.newton_coefficient <= 1)) {
-    return fmt::format("newton_coefficient is {}; it must lie between 0 and 1",
-                       options.newton_coefficient);
-  }
-  if (!(options.fixed_step >= 0)) {
-    return "fixed_step is " + std::to_string(options.fixed_step) + "; it must not be negative";
-  }
-  for (size_t i = 0; i < options.stop_times.size(); ++i) {
+  require(options.step_limit >= 1, "step_limit is", options.step_limit, "it must be at least 1");
+  require(options.time_limit_s > 0, "time_limit_s is", std::to_string(options.time_limit_s),
+          "it must be positive");
+  require(options.max_step >= 0, "max_step is", std::to_string(options.max_step), kNoNegative);
+  require(options.initial_step >= 0, "initial_step is", options.initial_step, kNoNegative);
+  require(options.max_newton_iterations >= 0, "max_newton_iterations is",
+          options.max_newton_iterations, kNoNegative);
+  require(options.newton_coefficient > 0 && options.newton_coefficient <= 1,
+          "newton_coefficient is", options.newton_coefficient, "it must lie between 0 and 1");
+  require(options.fixed_step >= 0, "fixed_step is", std::to_string(options.fixed_step),
+          kNoNegative);
+  for (std::size_t i = 0; i < options.stop_times.size(); ++i) {
     const double t = options.stop_times[i];
-    if (!std::isfinite(t) || (i > 0 && t < options.stop_times[i - 1])) {
-      return "stop_times[" + std::to_string(i) + "] is " + std::to_string(t) +
-             "; stop times must be finite and in order";
-    }
+    require(std::isfinite(t) && (i == 0 || !(t < options.stop_times[i - 1])),
+            fmt::format("stop_times[{}] is", i), std::to_string(t),
+            "stop times must be finite and in order");
   }
-  return "";
+  return fault;
 }
 
 bool ButcherTable::is_implicit() const {

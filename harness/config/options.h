@@ -52,6 +52,25 @@ std::string ToString(const ButcherTable& table);
 /// Returns the tables of the installed ARKODE, explicit ones first, by ARKODE's names.
 std::vector<ButcherTable> ArkodeTables();
 
+/// Options of all profiles besides method and tolerances, as in experiment files. Each has a row in
+/// experiment_integrators.cpp.
+struct Integration {
+  /// Longest step in seconds; 0 is the profile's own (ode45: a tenth of the interval; else none).
+  double max_step = 0;
+
+  /// Length of the first step in seconds; 0 is the profile's own choice.
+  double initial_step = 0;
+
+  /// Limit of Newton's iterations in a stage of an implicit profile; 0: 8, and 50 at a fixed step.
+  int max_newton_iterations = 0;
+
+  /// Newton's iteration ends at an estimated error of this part of the tolerances. At ARKODE's 0.1
+  /// it dominates the global error.
+  double newton_coefficient = 0.01;
+
+  friend bool operator==(const Integration&, const Integration&) = default;
+};
+
 /// Options of the integrator. A profile is a Runge-Kutta pair with an error norm, a step-size
 /// controller and a first-step rule. All of them change drift (by factors of two to four), so a
 /// comparison must name its profile.
@@ -88,7 +107,7 @@ std::vector<ButcherTable> ArkodeTables();
 ///
 /// "ode45" follows MATLAB's function of that name (L. Shampine, M. Reichelt, The MATLAB ODE suite,
 /// 1997): step counts agree with it within about 1 %.
-struct IntegratorOptions {
+struct IntegratorOptions : Integration {
   std::string profile = "ode45";
 
   /// Relative and absolute tolerance of one step's error estimate. ode45 accepts if
@@ -103,22 +122,8 @@ struct IntegratorOptions {
   std::int64_t step_limit = 10'000'000;
 
   /// CPU time of the thread in seconds before the run ends with kTimeLimit, without waiting for a
-  /// processor. Checked after every accepted step and on every 16th derivative, so a derivative
-  /// that hangs is not interrupted.
+  /// processor. Checked after every accepted step and on every 16th derivative.
   double time_limit_s = 600;
-
-  /// Longest step in seconds; 0 is the profile's own (ode45: a tenth of the interval; else none).
-  double max_step = 0;
-
-  /// Length of the first step in seconds; 0 is the profile's own choice.
-  double initial_step = 0;
-
-  /// Limit of Newton's iterations in a stage of an implicit profile; 0: 8, and 50 at a fixed step.
-  int max_newton_iterations = 0;
-
-  /// Newton's iteration ends at an estimated error of this part of the tolerances. At ARKODE's 0.1
-  /// it dominates the global error.
-  double newton_coefficient = 0.01;
 
   /// If positive, every step has this length and no error test is made. The last step, and steps
   /// that end at a stop time, are clipped. Tolerances are then used by Newton's iteration only.
@@ -142,8 +147,7 @@ inline constexpr double kMinTolerance = std::numeric_limits<double>::epsilon();
 /// above round-off, where the iteration would not converge.
 inline constexpr double kToleranceOfFixedSteps = 1e-10;
 
-/// Returns "" if the options are valid, otherwise a sentence with the option, its value and the
-/// allowed values.
+/// Returns "" for valid options, otherwise a sentence with an option, its value and allowed ones.
 std::string Validate(const IntegratorOptions& options);
 
 /// Returns the names of the tables above, in their order.
@@ -192,8 +196,7 @@ std::vector<std::string> IntegratorNames();
 /// that FaultOfIntegrator() returns.
 void RegisterIntegrator(const ButcherTable& table);
 
-/// Returns a fault of the table or of its name: no word of a-z, 0-9, '-' and '_',
-/// or the name of another integrator.
+/// Returns a fault of the table or its name: no word of a-z, 0-9, '-' and '_', or not a new one.
 std::optional<TableFault> FaultOfIntegrator(const ButcherTable& table);
 
 }  // namespace loopbench::harness

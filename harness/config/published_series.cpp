@@ -208,7 +208,7 @@ PublishedSeries ReadPublishedSeries(const std::filesystem::path& path,
     SeriesDraft draft;
     draft.mechanism = mechanism;
     if (ExpectDocument(root, FileKind::kSeries)) SeriesFileFields().ReadRows(root, &draft);
-    draft.canonical = root.value().dump(-1, ' ', false, Json::error_handler_t::replace);
+    draft.canonical = CompactText(root.value());
     return static_cast<PublishedSeries>(std::move(draft));
   });
 }

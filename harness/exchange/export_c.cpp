@@ -1,12 +1,7 @@
 #include "harness/exchange/export_c.h"
 
-#include <fmt/format.h>
-
-#include <algorithm>
 #include <boost/crc.hpp>
 #include <cctype>
-#include <cmath>
-#include <cstdint>
 
 #include "harness/base/text.h"
 #include "harness/exchange/export_names.h"

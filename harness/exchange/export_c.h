@@ -48,8 +48,7 @@ struct Code {
   std::vector<CodeFile> files;  ///< NAME.h, NAME.c, NAME_example.c, CMakeLists.txt
 };
 
-/// Records each function again wherever the motion enters a new branch, at most kMaxCodeBranches +
-/// 1 times. Throws generate::NotCovered.
+/// Records each function per branch, at most kMaxCodeBranches + 1 times. Throws NotCovered.
 Code MakeCode(const CodeRequest& request);
 
 inline constexpr int kMaxCodeBranches = 16;

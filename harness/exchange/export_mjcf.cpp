@@ -1,9 +1,6 @@
 #include "harness/exchange/export_mjcf.h"
 
-#include <fmt/format.h>
-
 #include <Eigen/Geometry>
-#include <algorithm>
 #include <cmath>
 
 #include "harness/base/text.h"
@@ -60,8 +57,7 @@ struct MjcfChain {
   Matrix3d axes = Matrix3d::Identity();  ///< moved joint frame, in body axes
 };
 
-/// Returns the parts of a tree joint of this kind, from F to M, each in axes moved by the previous
-/// parts; null if MuJoCo does not have it.
+/// Returns the parts of a tree joint, from F to M, each in axes moved by those before; or null.
 const std::vector<PartKind>* PartsOf(const Joint& joint) {
   static const std::map<std::string, std::vector<PartKind>> kParts = {
       {"weld", {}},

@@ -1,7 +1,5 @@
 #include "harness/exchange/export_names.h"
 
-#include <fmt/format.h>
-
 #include <Eigen/Geometry>
 #include <cmath>
 #include <limits>

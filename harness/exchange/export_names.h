@@ -10,8 +10,7 @@
 
 namespace loopbench::exchange {
 
-/// Tolerance of principal moments of inertia, in parts of the largest: round-off of sums of rotated
-/// inertias and of their eigenvalues.
+/// Tolerance of principal moments of inertia, relative to the largest: round-off.
 inline constexpr double kMomentRoundOff = 0x1p-46;  // 64 units of round-off
 
 // Numbers of a model as vectors and matrices of Eigen.
@@ -25,18 +24,15 @@ inline Eigen::Matrix3d ToEigen(const Matrix& A) {
   return Eigen::Matrix3d{{A[0], A[1], A[2]}, {A[3], A[4], A[5]}, {A[6], A[7], A[8]}};
 }
 
-// Escaping of user names in exported documents and programs: unchanged text if the language allows
-// it, and never code.
+// User names in exported documents and programs: unchanged if the language allows it, never code.
 
-/// Returns the text for an XML attribute: characters escaped by EscapeTerminal() are made visible,
-/// except tabs and line ends.
+/// Returns the text for an XML attribute: escaped by EscapeTerminal() except tabs and line ends.
 std::string XmlText(std::string_view text);
 
 /// Returns such a text escaped for use between the quotation marks of an attribute.
 std::string EscapeXmlAttribute(std::string_view text);
 
-/// Returns a comment line for XML or C++ `//`; its text cannot end the comment or continue in the
-/// next line.
+/// Returns a comment line for XML or C++ `//`; its text cannot end it or go on in the next line.
 std::string EscapeComment(std::string_view text);
 
 /// Returns comment lines of a long text, wrapped at spaces, each after `begin`.
@@ -45,8 +41,7 @@ std::string CommentLines(const std::string& begin, std::string_view text);
 /// Returns all notes; notes with a loss follow a heading of their own.
 std::string CommentOfNotes(const std::string& begin, const std::vector<Note>& notes);
 
-/// Returns a C++ string literal with quotation marks, in ASCII. Escapes the question mark too: two
-/// of them begin a trigraph.
+/// Returns a C++ string literal in ASCII. Escapes question marks too: two begin a trigraph.
 std::string QuoteCpp(std::string_view text);
 
 /// Returns the shortest text that reads back as this number, always with a point or an exponent.

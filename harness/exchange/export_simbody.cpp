@@ -1,9 +1,5 @@
 #include "harness/exchange/export_simbody.h"
 
-#include <fmt/format.h>
-
-#include <optional>
-
 #include "harness/base/record.h"
 #include "harness/base/text.h"
 #include "harness/exchange/export_names.h"
@@ -43,8 +39,7 @@ struct Row {
 };
 using Rows = std::vector<Row>;
 
-/// Closures of joints, in the plane and in space. In the plane the tree keeps z = 0, so that points
-/// stay free along z.
+/// Closures of joints. In the plane the tree keeps z = 0, so that points stay free along z.
 struct Closure {
   Rows in_plane, in_space;
 };
@@ -76,8 +71,7 @@ std::optional<Rows> ClosureOf(const Joint& joint, bool planar) {
   if (joint.kind == "free") return Rows();
   if (joint.kind == "rod") return Rows{{Type::kRod}};
   if (!planar && !joint.imposed.empty()) {
-    // Rotations about x and y of F by z of M, independent of a free rotation about z; about z if
-    // there is none.
+    // Rotations about x and y of F by z of M; about z if it is not free.
     constexpr Row kRotations[] = {{Type::kConstantAngle, kY, kZ},
                                   {Type::kConstantAngle, kX, kZ},
                                   {Type::kConstantAngle, kX, kY}};
@@ -115,8 +109,7 @@ SimbodyMobilizer MakeMobilizer(const Model& model, std::size_t index) {
   }
   made.mass = body.mass;
   const Matrix& I = body.inertia;
-  // A planar body has a moment about z only; Simbody requires the other two, which have no effect
-  // on the motion.
+  // A planar body has a moment about z only; Simbody requires the other two, without effect.
   made.inertia = {I[0], I[4], I[8], I[1], I[2], I[5]};
   if (model.planar) made.inertia = {I[8], I[8], I[8], 0.0, 0.0, 0.0};
   return made;

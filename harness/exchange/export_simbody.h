@@ -6,8 +6,7 @@
 
 namespace loopbench::exchange {
 
-// Body frames are at centres of mass. Names are those of Simbody's classes; arguments have the
-// order of their constructors.
+// Body frames are at centres of mass. Names and orders of arguments are those of Simbody's classes.
 
 struct SimbodyMobilizer {
   std::string type;                    ///< "Pin": MobilizedBody::Pin

@@ -1,7 +1,6 @@
 #include "harness/exchange/import.h"
 
 #include <limits>
-#include <tuple>
 
 #include "harness/base/text.h"
 #include "harness/config/mechanism_sections.h"
@@ -159,8 +158,7 @@ const Fields<Sidecar, const Draft>& SidecarFields() {
   return fields;
 }
 
-/// Adds the content of the file to `description`; its start replaces the given one. Throws
-/// ConfigError with all mistakes, one per line.
+/// Adds the file to `description`, with its start. Throws ConfigError with all mistakes.
 Sidecar ReadSidecar(const std::filesystem::path& path, const std::vector<Frame>& at_rest,
                     MechanismDescription* description) {
   Sidecar sidecar;

@@ -41,12 +41,10 @@ struct ImportOptions {
 
 inline std::vector<std::string> ImportFormats() { return {"mjcf", "urdf", "sdf"}; }
 
-/// Reads a file. Throws ConfigError for invalid or inexpressible content, with file, line, element,
-/// found and expected value.
+/// Throws ConfigError for invalid or inexpressible content: file, line, element, found, expected.
 Imported ImportMechanism(const std::filesystem::path& path, const ImportOptions& options = {});
 
-/// Reads a text; `file` is the name used in messages. Without the `path` of its file it includes no
-/// others.
+/// Reads a text; `file` is the name used in messages. Without a `path` it includes no files.
 Imported ImportText(std::string_view text, const std::string& file,
                     const ImportOptions& options = {},
                     const std::optional<std::filesystem::path>& path = {});

@@ -40,8 +40,7 @@ namespace {
 
 using Eigen::Matrix3d, Eigen::Quaterniond, Eigen::Vector3d;
 
-/// Tolerance for parallel, perpendicular and intersecting axes: rounding in a file with nine
-/// digits.
+/// Tolerance for parallel, perpendicular and intersecting axes: rounding at nine digits.
 constexpr double kAligned = 1e-9;
 
 /// Returns the intersection of the axes of hinges; nothing if there is none.

@@ -104,8 +104,7 @@ inline Eigen::Matrix3d SymmetricMatrix(double xx, double yy, double zz, double x
 /// the sum of the others; as MuJoCo's balanceinertia.
 bool Balance(Eigen::Matrix3d* inertia);
 
-/// Returns the inertia from its elements. `get`: returns the element of a name, "ixx" to "iyz", and
-/// of a kind, true for moments.
+/// Returns the inertia from its elements: get("ixx" to "iyz", whether it is a moment).
 template <class Get>
 Eigen::Matrix3d InertiaOf(const Get& get) {
   return SymmetricMatrix(get("ixx", true), get("iyy", true), get("izz", true), get("ixy", false),
@@ -147,8 +146,7 @@ inline constexpr const char* kNotCoupled =
 inline constexpr const char* kDrakeBall = "drake:ball_constraint";
 inline constexpr const char* kNoEnds = "joints turn and slide without ends";
 
-/// Returns the entry of a name; if there is none, rejects the value with `expected` and the nearest
-/// name.
+/// Returns the entry of a name; otherwise rejects the value with `expected` and the nearest name.
 template <class Entry>
 const Entry& Named(const std::map<std::string, Entry>& entries, const std::string& name,
                    const XmlValue& value, std::string_view expected) {
@@ -195,8 +193,7 @@ void SetComposed(const std::vector<SerialJoint>& series, const ComposedJoint& co
                  std::vector<double>* speeds);
 struct MasslessChain;
 
-/// A mechanism during its import in any format: the format readers fill it, and Finish() completes
-/// it.
+/// A mechanism during its import in any format: readers fill it, and Finish() completes it.
 class ImportDraft {
  public:
   ImportDraft(const XmlElement& root, const ImportOptions& options);
@@ -206,8 +203,7 @@ class ImportDraft {
   std::vector<Placement> at_rest;  ///< poses of bodies in ground axes at zero coordinates
   int base = kGround;  ///< the body of its part that gets a free joint; by default the first one
 
-  /// Adds a body; "" is replaced by the next free number. Rejects a name in use. The mass is
-  /// initially 0.
+  /// Adds a body without mass; "" is replaced by the next free number. Rejects a name in use.
   int AddBody(const XmlElement& element, const std::string& name);
   /// Adds a link without mass between joints of a body. References do not find it.
   int AddLink(const XmlElement& element, int body) {
@@ -340,19 +336,16 @@ class ImportDraft {
   /// Merges bodies without valid own mass with bodies that they are welded to; with `whole`, merges
   /// all bodies that are fixed together with such a body.
   void MergeFixed(bool whole);
-  /// Makes one joint of joints in series through bodies without mass where they form one, and gives
-  /// mass to the other such bodies.
+  /// Makes one joint of joints in series through bodies without mass, or gives these bodies mass.
   void ComposeChains();
   void ReplaceChain(const MasslessChain& chain, const ComposedJoint& composed);
-  /// Rejects joints of a placed chain that repeat motions of each other, unless they are
-  /// `determined` without mass.
+  /// Rejects joints of a placed chain that repeat motions, unless `determined` without mass.
   void RejectRepeated(const MasslessChain& chain, const std::vector<bool>& determined) const;
   /// Gives mass to the bodies of a placed chain, with a note of its effect on the motion.
   void GiveMassToLinks(const MasslessChain& chain);
   /// Removes attached bodies (one entry per body) and the joints within their carriers.
   void Attach(const std::vector<Attachment>& attachments);
-  /// Fixes bodies without mass at the ends of chains where they are drawn: their motion has no
-  /// effect.
+  /// Fixes bodies without mass at the ends of chains: their motion has no effect.
   void FixMasslessEnds();
   /// Returns true if a joint without load moves others through couplings.
   bool CouplesOthers(int joint) const;
@@ -397,8 +390,7 @@ void PlaceFollowers(ImportDraft* draft);
 void ReadMjcf(const XmlElement& root, ImportDraft* draft);
 void ReadUrdf(const XmlElement& root, const ImportOptions& options, ImportDraft* draft);
 void ReadSdf(const XmlElement& root, ImportDraft* draft);
-/// Reads joints of SDF in <gazebo> elements of a URDF robot, which close loops. The draft has all
-/// bodies with their poses.
+/// Reads joints of SDF in <gazebo> elements of a URDF robot, whose bodies the draft has.
 void ReadGazeboJoints(const XmlElement& robot, const std::vector<XmlElement>& joints,
                       ImportDraft* draft);
 

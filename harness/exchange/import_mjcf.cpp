@@ -150,8 +150,7 @@ void NoteMedium(const XmlElement& root, const MjcfModel& model) {
   }
 }
 
-/// Keeps meshes for the masses of geoms; the name of a mesh is by default its file's without
-/// ending.
+/// Keeps meshes for the masses of geoms, by default under their file's name without ending.
 void ReadAssets(const XmlElement& root, MjcfModel* model) {
   for (const XmlElement& assets : root.Children({"asset"})) {
     for (const XmlElement& mesh : assets.Children({"mesh"})) {

@@ -12,8 +12,7 @@ namespace loopbench::harness {
 /// Attributes that limit the efforts of all actuators of a joint.
 inline constexpr const char *kEffortFlag = "actuatorfrclimited", *kEffortRange = "actuatorfrcrange";
 
-/// <default> and its nested classes. The top class is "main", the default of elements without a
-/// class; it may have another name too.
+/// <default> and its nested classes. The top class, which may be named, is "main", the usual one.
 class MjcfDefaults {
  public:
   void Read(const XmlElement& element, const std::string& parent);
@@ -101,8 +100,7 @@ class MjcfModel {
   MjcfSettings settings;
   MjcfDefaults defaults;
   std::vector<MjcfJoint> joints;  ///< in the order of qpos
-  /// Poses of bodies in ground axes with relaxed joint springs, which define the default rest
-  /// length of tendons.
+  /// Poses of bodies in ground axes at relaxed joint springs, for default lengths of tendons.
   std::vector<Placement> where_springs_are_free = {Placement()};
   std::map<std::string, FrameOn> sites;
   std::map<std::string, XmlElement> meshes;
@@ -191,8 +189,7 @@ void IncludeMjcf(const XmlElement& root);
 void ReadMjcfWorld(const XmlElement& world, MjcfModel* model);
 /// Applies the total mass and the bounds of <compiler> to all bodies.
 void AdjustMasses(MjcfModel* model);
-/// An element within a body with its defaults, its enclosing frame in the body, and the default
-/// class there.
+/// An element within a body, with its defaults, enclosing frame and the default class there.
 struct MjcfPlaced {
   XmlElement element;
   Placement X;
@@ -202,8 +199,7 @@ struct MjcfPlaced {
 /// Adds the joints of a body in series, with links between; X_PB is the drawn pose of the body.
 void AddMjcfJoints(MjcfModel* model, const XmlElement& body, int parent, int child,
                    const Placement& X_PB, const std::vector<MjcfPlaced>& joints);
-/// Reads constraints, and spatial tendons between two sites: springs, or rods if an <equality>
-/// keeps their length.
+/// Reads constraints and tendons between two sites: springs, or rods if an <equality> fixes them.
 void ReadMjcfLoops(const XmlElement& root, MjcfModel* model);
 void ReadMjcfKeys(const XmlElement& root, MjcfModel* model);
 /// Sets constant actuator efforts for these controls; by default all controls are 0.

@@ -72,8 +72,7 @@ TriangleMesh ReadVertices(const XmlValue& vertex, const std::optional<XmlValue>&
   return mesh;
 }
 
-/// Reads a mesh of <asset> as a solid in its own frame. Points without triangles mean their convex
-/// hull.
+/// Reads a mesh of <asset> as a solid in its frame; points without triangles as convex hull.
 Solid ReadMeshSolid(const MjcfModel& model, const XmlElement& asset) {
   const auto file = asset.Attribute("file"), vertex = asset.Attribute("vertex");
   if (!file && !vertex) {
@@ -136,8 +135,7 @@ const Solid& MeshSolid(const MjcfModel& model, const XmlValue& name) {
   return known->second;
 }
 
-/// Reads a geom; returns false if it has no mass. `is_idle`: its mass has no effect, so that shapes
-/// that are not read are accepted.
+/// Reads a geom; returns false if it has no mass. `is_idle`: without effect, of any shape.
 bool ReadGeom(const MjcfModel& model, const MjcfPlaced& geom, bool is_idle, PlacedSolid* read) {
   const XmlElement& element = geom.element;
   const auto given = element.Attribute("type");

@@ -44,8 +44,9 @@ std::string KindAndName(XmlNode& node, const std::string& prefix = "") {
 }
 
 Nodes Named(const XmlNode& root, std::string_view tag) {
-  Nodes named = root.children;
-  std::erase_if(named, [&](const XmlNodePointer& child) { return child->tag != tag; });
+  Nodes named;
+  std::ranges::copy_if(root.children, std::back_inserter(named),
+                       [&](const XmlNodePointer& child) { return child->tag == tag; });
   return named;
 }
 
@@ -76,8 +77,7 @@ void PrefixReferences(XmlNode& node, const std::string& prefix) {
   for (const auto& [key, kind] : kReferences) Prefix(node, key, prefix);
 }
 
-/// Returns the number of references of an element and its contents into `inside`, or -1 if some are
-/// to other elements.
+/// Returns the number of references of an element and its contents; -1 if one leaves `inside`.
 int NumReferences(XmlNode& node, const std::set<std::string>& inside) {
   int count = 0;
   for (const auto& [key, kind] : kReferences) {
@@ -132,10 +132,27 @@ class Includer {
         one.Set("file", file.substr(file.find_last_of("/\\") + 1));
       });
     }
+    Attached outer;
+    std::swap(outer, attached_);
     for (const XmlNodePointer& world : Named(root, "worldbody")) AttachIn(*world, root, folder);
+    std::swap(outer, attached_);
+    std::ranges::move(outer.sections, std::back_inserter(root.children));
   }
 
  private:
+  /// Sections of attached models and of copies. The model takes them over when all are attached:
+  /// searches through its own sections stay short.
+  struct Attached {
+    Nodes sections, with_models;  ///< with_models: those <asset> sections that contain a <model>
+
+    void Add(const XmlNodePointer& section) {
+      sections.push_back(section);
+      if (section->tag == "asset" && !Named(*section, "model").empty()) {
+        with_models.push_back(section);
+      }
+    }
+  };
+
   void Include(XmlNode& node, const fs::path& folder) {
     Nodes children;
     for (const XmlNodePointer& child : node.children) {
@@ -156,8 +173,7 @@ class Includer {
     node.children = std::move(children);
   }
 
-  /// Reads a file, named from the folder of the main file or from `folder`, and returns its root
-  /// element. It is the last of the open files.
+  /// Reads a file, named from the main file's folder or from `folder`. It is the last open file.
   XmlNodePointer Open(const XmlValue& name, const fs::path& folder, fs::path* shown) {
     constexpr std::size_t kMaxDepth = 16;
     *shown = name.File({}, folder);
@@ -213,7 +229,9 @@ class Includer {
     if (!given_model) return AttachCopy(attach, root);
     const XmlValue& model = *given_model;
     std::optional<XmlValue> file;
-    for (const XmlNodePointer& asset : Named(root, "asset")) {
+    Nodes assets = Named(root, "asset");
+    std::ranges::copy(attached_.with_models, std::back_inserter(assets));
+    for (const XmlNodePointer& asset : assets) {
       for (const XmlElement& given : XmlElement(asset).Children({"model"})) {
         const XmlValue path = given.Required("file", "a MJCF file");
         if (NameOf(given, path, folder) == model.text()) file = path;
@@ -258,7 +276,7 @@ class Includer {
     if (part) DropOutside(other, *frame);
     for (const char* tag : {"default", "asset", "contact", "tendon", "equality", "actuator",
                             "deformable", "extension"}) {
-      std::ranges::copy(Named(other, tag), std::back_inserter(root.children));
+      for (const XmlNodePointer& section : Named(other, tag)) attached_.Add(section);
     }
     return frame;
   }
@@ -320,17 +338,26 @@ class Includer {
   /// names there. As in MuJoCo, the world is outside.
   void CopyReferring(XmlNode& root, std::set<std::string>* inside, const std::string& prefix,
                      const XmlElement& attach) {
-    Nodes sections;
-    ForElements(root, kReferring, [&](XmlNode& one, const char* tag) {
-      ++visited_;
-      if (NumReferences(one, *inside) <= 0) return;
-      if (const std::string name = ValueOf(one, "name"); !name.empty()) {
-        inside->insert(std::string(tag) + " " + name);
+    Nodes made;
+    const auto copy_from = [&](const XmlNode& section) {
+      for (const XmlNodePointer& one : section.children) {
+        ++visited_;
+        if (NumReferences(*one, *inside) <= 0) continue;
+        if (const std::string name = ValueOf(*one, "name"); !name.empty()) {
+          inside->insert(section.tag + " " + name);
+        }
+        made.push_back(std::make_shared<XmlNode>(XmlNode{
+            .file = root.file, .tag = section.tag, .children = {Copy(*one, prefix, attach)}}));
       }
-      sections.push_back(std::make_shared<XmlNode>(
-          XmlNode{.file = root.file, .tag = tag, .children = {Copy(one, prefix, attach)}}));
-    });
-    std::ranges::copy(sections, std::back_inserter(root.children));
+    };
+    for (const char* tag : kReferring) {
+      for (const Nodes* sections : {&root.children, &attached_.sections}) {
+        for (const XmlNodePointer& section : *sections) {
+          if (section->tag == tag) copy_from(*section);
+        }
+      }
+    }
+    for (const XmlNodePointer& section : made) attached_.Add(section);
     attach.RequireFew(visited_, 10000000, "elements to search for copies");
   }
 
@@ -410,6 +437,7 @@ class Includer {
   const XmlFile main_;
   std::vector<fs::path> open_;  ///< the files around the element, the main file first
   std::set<fs::path> known_;    ///< of the model that is read
+  Attached attached_;           ///< to the model that is read
   std::uintmax_t bytes_ = 0;
   std::size_t copied_ = 0, visited_ = 0;  ///< elements, for all copies
   std::size_t num_defaults_ = 0;          ///< of attached models

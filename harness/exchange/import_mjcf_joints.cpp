@@ -1,5 +1,4 @@
-// Joints and actuators of MuJoCo. Joints of one body act in series, with links without mass
-// between.
+// Joints and actuators of MuJoCo. Joints of one body act in series, through links without mass.
 #include "harness/exchange/import_mjcf.h"
 
 namespace loopbench::harness {

@@ -15,8 +15,8 @@ std::string NameOr(const XmlElement& element, const std::string& otherwise) {
 
 /// Adds a <connect> or <weld> of two sites, or of two bodies by a point or pose at rest.
 ///
-/// MuJoCo's weld: x1 + R1 relpose = x2 + R2 anchor, and torquescale times the relative rotation is
-/// 0 (engine_core_constraint.c).
+/// MuJoCo's weld (engine_core_constraint.c): x1 + R1 relpose = x2 + R2 anchor, and torquescale
+/// times the relative rotation is 0.
 void AddClosure(const XmlElement& equality, MjcfModel* model) {
   ImportDraft* draft = model->draft;
   const bool is_weld = equality.tag() == "weld";
@@ -157,8 +157,7 @@ double LengthOf(const std::pair<BodyPoint, BodyPoint>& ends, const std::vector<P
   return (place(ends.first) - place(ends.second)).norm();
 }
 
-/// Adds the constraint of one or two tendons: a coupling of the joints of fixed tendons, or a rod.
-/// Returns false if it is dropped.
+/// Adds the constraint of one or two tendons: a coupling or a rod. Returns false if it is dropped.
 bool AddTendonEquality(const XmlElement& equality, const std::vector<XmlElement>& tendons,
                        MjcfModel* model) {
   ImportDraft* draft = model->draft;

@@ -1,4 +1,6 @@
 // SDF (sdformat.org, versions 1.4 to 1.12), in SDF files and in <gazebo> elements of URDF.
+#include "harness/exchange/import_sdf.h"
+
 #include "harness/exchange/solids.h"
 
 namespace loopbench::harness {
@@ -13,8 +15,6 @@ constexpr double kSdfDensity = 1000.0;   // [kg/m^3]
 constexpr double kPerpendicular = 1e-9;  // cosine tolerance for nine digits
 constexpr double kSameAxis = 1e-5;       // [rad]: axes of gearboxes repeat those of joints
 constexpr double kNoLimit = 1e15;        // the defaults are 1e16 and infinity
-constexpr const char* kWorld = "world";
-constexpr std::string_view kWithin = "::";  // between the names of a model and its part
 constexpr const char* kNoMedium = "there is no medium";
 constexpr const char* kByForces = "bodies move as forces make them";
 
@@ -33,146 +33,6 @@ constexpr DroppedReason kSdfReasons[] = {
      "magnetic_field spherical_coordinates self_collide allow_auto_disable must_be_base_link "
      "road gripper link@name model@canonical_link sdf@version",
      ""}};
-
-/// An element with a pose: a link, joint, frame or nested model.
-struct SdfFrame {
-  XmlElement element;
-  Placement raw = {};            ///< as given in the file
-  std::string relative_to = "";  ///< a name in the same scope; "" for the scope's own frame
-  std::string attached_to = "";  ///< for frames and joints: the name that they move with
-  bool is_raw_to_child = false;  ///< for joints: raw is in the frame of the child
-};
-
-/// A world, a model or a URDF robot: its named elements, each in its own frame.
-struct SdfScope {
-  XmlElement element;
-  ImportDraft* draft;
-  int minor;                ///< of version 1.x
-  std::string prefix = "";  ///< of names of bodies and joints: "arm::"
-  bool is_static = false;
-  std::map<std::string, SdfFrame> frames = {};
-  std::vector<XmlElement> joints = {};
-  std::map<std::string, std::unique_ptr<SdfScope>> models = {};  ///< nested; each has a frame too
-  Placement at_rest = {};                                        ///< in ground axes
-
-  /// A link's scope and its name there; no scope for the world.
-  using Link = std::pair<const SdfScope*, std::string>;
-  // results, so that a chain of frames is followed once
-  mutable std::map<std::string, Placement> resolved_poses = {};
-  mutable std::map<std::string, Link> resolved_links = {};
-
-  bool is_urdf() const { return element.tag() == "robot"; }
-  /// Returns the name of a joint's frame. Before 1.7 joints are no frames, and links may have their
-  /// names.
-  std::string FrameOf(const std::string& joint) const {
-    return minor < 7 ? "joint " + joint : joint;
-  }
-  /// Refuses a name that is in use here.
-  void Add(const std::string& name, SdfFrame frame) {
-    const auto [known, is_new] = frames.emplace(name, frame);
-    if (is_new) return;
-    frame.element.Fail(
-        fmt::format("a second \"{}\"", name),
-        fmt::format("a name that is not in use (line {} has it)", known->second.element.line()));
-  }
-  bool is_world() const { return element.tag() != "model"; }
-  bool IsOwn(const std::string& name) const {
-    return name.empty() || name == "__model__" || (is_world() && name == kWorld);
-  }
-  const SdfFrame& FrameNamed(const std::string& name, const XmlElement& user) const {
-    const auto found = frames.find(name);
-    if (found != frames.end()) return found->second;
-    user.Fail(fmt::format("the frame \"{}\", which is not there", name),
-              "a link, joint, frame or nested model of the same model");
-  }
-  /// Splits "arm::hand" into the model "arm" and the name "hand".
-  const SdfScope* NestedScope(const std::string& name, std::string* rest) const {
-    const std::size_t cut = name.find(kWithin);
-    if (cut == std::string::npos) return nullptr;
-    const auto found = models.find(name.substr(0, cut));
-    if (found == models.end()) return nullptr;
-    *rest = name.substr(cut + kWithin.size());
-    return found->second.get();
-  }
-  /// Returns the pose of a frame in this scope's frame. `user`: the referring element.
-  Placement Resolve(const std::string& name, const XmlElement& user) const;
-  /// Returns the link that a link, frame or model moves with.
-  Link LinkOf(const std::string& name, const XmlElement& user) const;
-};
-
-Placement SdfScope::Resolve(const std::string& name, const XmlElement& user) const {
-  // chain of relative frames, up to a known one
-  std::vector<std::pair<std::string, Placement>> chain;
-  Placement X;
-  for (std::string here = name, next; !IsOwn(here); here = next) {
-    if (const auto known = resolved_poses.find(here); known != resolved_poses.end()) {
-      X = known->second;
-      break;
-    }
-    // without a cycle, a chain has at most each frame and a name within each model
-    if (chain.size() > 2 * frames.size()) {
-      user.Fail("frames that are relative to each other", "no cycle");
-    }
-    std::string rest;
-    if (const SdfScope* nested = NestedScope(here, &rest)) {
-      chain.emplace_back(here, nested->Resolve(rest, user));
-      next = here.substr(0, here.find(kWithin));
-    } else {
-      const SdfFrame& frame = FrameNamed(here, user);
-      chain.emplace_back(here, frame.raw);
-      next = frame.relative_to;
-    }
-  }
-  for (auto link = chain.rbegin(); link != chain.rend(); ++link) {
-    X = X * link->second;
-    resolved_poses.emplace(link->first, X);
-  }
-  return X;
-}
-
-SdfScope::Link SdfScope::LinkOf(const std::string& name, const XmlElement& user) const {
-  std::vector<std::string> chain;  // each attached to the next
-  std::string here = name;
-  std::optional<Link> link;
-  while (!link) {
-    if (const auto known = resolved_links.find(here); known != resolved_links.end()) {
-      link = known->second;
-      break;
-    }
-    if (chain.size() > frames.size() + 1) {
-      user.Fail("frames that are attached to each other", "no cycle");
-    }
-    chain.push_back(here);
-    std::string rest;
-    if (const SdfScope* nested = NestedScope(here, &rest)) {
-      link = nested->LinkOf(rest, user);
-    } else if (IsOwn(here) && is_world()) {
-      link = Link{nullptr, ""};
-    } else if (IsOwn(here)) {
-      // a model moves with its canonical link, by default the first one
-      const auto canonical = element.Filled("canonical_link");
-      const std::vector<XmlElement> links = element.Children({"link"});
-      if (!canonical && links.empty()) {
-        user.Fail(fmt::format("the model of \"{}\" without a link", name), "one");
-      }
-      here = canonical ? canonical->text() : links[0].RequiredName();
-    } else {
-      const SdfFrame& frame = FrameNamed(here, user);
-      const std::string tag = frame.element.tag();
-      if (tag == "link") link = Link{this, here};
-      if (tag == "model") link = models.at(here)->LinkOf("", user);
-      here = frame.attached_to;
-    }
-  }
-  for (const std::string& attached : chain) resolved_links.emplace(attached, *link);
-  return *link;
-}
-
-void RefuseIncludes(const XmlElement& element) {
-  for (const XmlElement& include : element.Children({"include"})) {
-    include.Fail("a model in another file", "all in one file (gz sdf -p FILE writes it)");
-  }
-}
 
 void Shorten(SdfScope* scope, std::size_t length) {
   scope->prefix = scope->prefix.substr(length);
@@ -229,93 +89,6 @@ int VersionOf(const XmlElement& root) {
     if (value.text() == fmt::format("1.{}", minor)) return minor;
   }
   value.Fail("a version from 1.4 to 1.12");
-}
-
-/// Reads the <pose> of an element and its `relative_to`.
-SdfFrame ReadPose(const XmlElement& element, const SdfScope& scope) {
-  SdfFrame frame{element};
-  const auto pose = element.Child("pose");
-  if (!pose) return frame;
-  if (const auto old = pose->Filled("frame")) {
-    old->Fail("none: what it means was said only from 1.7 on, as relative_to");
-  }
-  if (const auto relative = pose->Filled("relative_to")) {
-    if (scope.minor < 7) relative->Fail("none before version 1.7");
-    frame.relative_to = relative->Name();
-  }
-  const bool in_degrees = BoolOr(pose->Attribute("degrees"));
-  const auto format = pose->Attribute("rotation_format");
-  const bool quaternion =
-      format && format->Choice<bool>({{"euler_rpy", false}, {"quat_xyzw", true}});
-  const XmlValue content = pose->Content();
-  if (content.text().empty()) return frame;
-  const char* kinds = quaternion ? "nnnr" : in_degrees ? "nnnnnn" : "nnnaaa";
-  const std::vector<double> p = scope.draft->Numbers(content, kinds);
-  frame.raw.p = {p[0], p[1], p[2]};
-  frame.raw.q = quaternion
-                    ? UnitQuaternion(content, {p[6], p[3], p[4], p[5]})
-                    : FromRollPitchYaw((in_degrees ? kDegree : 1.0) * Vector3d(p[3], p[4], p[5]));
-  return frame;
-}
-
-/// Returns the pose of a part in its link. Only parts other than <inertial> may be relative to
-/// other frames.
-Placement PoseInLink(const XmlElement& part, const XmlElement& link, const SdfScope& scope) {
-  const SdfFrame pose = ReadPose(part, scope);
-  const std::string own = link.RequiredName();
-  if (pose.relative_to.empty() || pose.relative_to == own) return pose.raw;
-  if (part.tag() == "inertial") {
-    part.RequiredChild("pose").Required("relative_to", "").Fail("none, or its own link");
-  }
-  return scope.Resolve(own, part).Inverse() * scope.Resolve(pose.relative_to, part) * pose.raw;
-}
-
-/// Reads the name and frame of a link, frame or joint.
-void ReadName(const XmlElement& child, SdfScope* scope) {
-  SdfFrame frame = ReadPose(child, *scope);
-  const bool is_joint = child.tag() == "joint";
-  if (is_joint) {
-    const XmlValue moved = child.RequiredChild("child").Content();
-    if (moved.Name() == kWorld) {
-      moved.Fail("a link, frame or nested model: the world is no child, it can be the <parent>");
-    }
-    frame.attached_to = moved.text();
-  } else if (child.tag() == "frame") {
-    if (const auto attached = child.Attribute("attached_to")) frame.attached_to = attached->text();
-  }
-  if (frame.relative_to.empty()) {
-    frame.relative_to = frame.attached_to;
-    frame.is_raw_to_child = is_joint;
-  }
-  const std::string name = child.RequiredName();
-  scope->Add(is_joint ? scope->FrameOf(name) : name, std::move(frame));
-}
-
-/// Reads all names of a world or model, including nested models.
-void ReadNames(SdfScope* scope) {
-  const XmlElement& element = scope->element;
-  RefuseIncludes(element);
-  scope->joints = element.Children({"joint"});
-  for (const char* tag : {"link", "frame", "joint"}) {
-    for (const XmlElement& child : element.Children({tag})) ReadName(child, scope);
-  }
-  for (const XmlElement& child : element.Children({"model"})) {
-    const std::string name = child.RequiredName();
-    const bool is_fixed = BoolOr(child.Content("static"));
-    const auto& model = scope->models[name] =
-        std::make_unique<SdfScope>(SdfScope{.element = child,
-                                            .draft = scope->draft,
-                                            .minor = scope->minor,
-                                            .prefix = scope->prefix + name + std::string(kWithin),
-                                            .is_static = scope->is_static || is_fixed});
-    ReadNames(model.get());
-    SdfFrame frame = ReadPose(child, *scope);
-    if (const auto placed = child.Filled("placement_frame")) {
-      // the pose is the pose of this frame of the model
-      frame.raw = frame.raw * model->Resolve(placed->Name(), child).Inverse();
-    }
-    scope->Add(name, std::move(frame));
-  }
 }
 
 /// Computes the mass of a link from its collision shapes, which have these poses in it.
@@ -693,8 +466,7 @@ void ReadGearbox(const XmlElement& element, const SdfScope& scope, const Turns& 
                      {parts[0].joint, -ratio * parts[0].ratio * parts[1].ratio}, 0.0);
 }
 
-/// Adds the joints of a scope and of its models, then their couplings. Joints of a URDF robot close
-/// loops.
+/// Adds the joints of a scope and its models, then couplings. Those of a URDF robot close loops.
 void ReadSdfJoints(const SdfScope& scope) {
   Couplings couplings;
   ReadJoints(scope, &couplings);

@@ -184,8 +184,7 @@ void AddMimic(const UrdfJoint& read, int follower, ImportDraft* draft) {
   draft->AddMimic(*mimic, follower, {leader, multiplier}, offset);
 }
 
-/// Reads a <transmission>: Drake's inertia of a rotor, seen from the joint, is gear_ratio^2 times
-/// the given one.
+/// Reads a <transmission>: Drake's rotor inertia at the joint is gear_ratio^2 times the given one.
 void ReadTransmission(const XmlElement& element, ImportDraft* draft) {
   // other types are no part of Drake's models
   const auto type = element.Content("type");

@@ -1,5 +1,4 @@
-// A mechanism in plain numbers, source of all exported documents, programs and peer models, and its
-// export.
+// A mechanism in plain numbers, source of all exported documents, programs and peer models.
 //
 // A forest of tree joints from Ground, the joints that close its loops, and bodies about their
 // centres of mass, all in 3D (a planar mechanism lies in z = 0). No Eigen and only C++17: required

@@ -1,6 +1,5 @@
 #include "harness/exchange/solids.h"
 
-#include <cstdint>
 #include <cstring>
 #include <tuple>
 

@@ -28,12 +28,10 @@ struct TriangleMesh {
 /// alone. Throws ConfigError for others, for faults with the line, and for files above 64 MiB.
 TriangleMesh ReadMesh(const std::filesystem::path& path);
 
-/// Returns the number of edges that have no triangle, or several, on one side; 0 if the mesh is
-/// closed.
+/// Returns the number of edges without just one triangle on each side; 0 for a closed mesh.
 std::size_t NumOpenEdges(const TriangleMesh& mesh);
 
-/// Returns the convex hull of points; without triangles if they lie in a plane, up to round-off.
-/// O(points times triangles).
+/// Returns the convex hull of points in O(points times triangles); no triangles for a plane.
 TriangleMesh ConvexHullOf(const std::vector<Eigen::Vector3d>& points);
 inline constexpr std::size_t kMostHullPoints = 10000;  ///< some seconds
 

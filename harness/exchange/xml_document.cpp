@@ -1,6 +1,5 @@
 #include "harness/exchange/xml_document.h"
 
-#include <fmt/format.h>
 #include <tinyxml2.h>
 
 #include <cmath>

@@ -1,5 +1,4 @@
-// XML files for the importers: elements and values with their location, strict parsing, and a
-// record of the parts that were read.
+// XML files for the importers: elements and values with their location, and which were read.
 //
 // XmlElement::ForUnread() lists all unread parts at the end, so that none is lost silently. All
 // errors are ConfigError, "FILE:LINE: <element name="...">: found ..., expected ...". Rejected
@@ -9,7 +8,6 @@
 
 #include <Eigen/Core>
 #include <algorithm>
-#include <charconv>
 #include <filesystem>
 #include <functional>
 #include <iterator>
@@ -81,8 +79,9 @@ std::vector<std::string_view> Words(std::string_view text);
 template <class Number>
 bool ReadNumber(std::string_view word, Number* number) {
   if (word.starts_with('+')) word.remove_prefix(1);
-  const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), *number);
-  return error == std::errc() && end == word.data() + word.size();
+  const std::optional<Number> whole = WholeNumber<Number>(word);
+  if (whole) *number = *whole;
+  return whole.has_value();
 }
 
 /// Returns the root element of a text. Throws ConfigError.
@@ -116,8 +115,7 @@ class XmlElement {
   /// Returns the only child with this tag; throws if it is absent.
   XmlElement RequiredChild(std::string_view tag) const;
 
-  /// Returns an attribute of the element or, if absent, of the nearest default that has it; names
-  /// have no default.
+  /// Returns an attribute of the element or else of its nearest default; names have no default.
   std::optional<XmlValue> Attribute(std::string_view name) const;
   /// Returns the number of an attribute; `otherwise` if absent.
   double Number(std::string_view name, double otherwise, const Range& range = {}) const;

@@ -199,7 +199,6 @@ bool Coincide(const PlotArea& area, std::span<const Point> one, std::span<const 
 
 namespace {
 
-/// Splits "odca, joint".
 std::vector<std::string> PartsOf(const std::string& label) {
   std::vector<std::string> parts;
   for (std::size_t from = 0; from <= label.size();) {
@@ -272,6 +271,116 @@ std::string LabelOfSeveral(const std::vector<std::string>& labels,
     products.push_back(Joined(texts, ", "));
   }
   return Joined(products, " and ");
+}
+
+double HeightOfPanel(FigureSize size, std::size_t panels) {
+  const double alone = size == FigureSize::kOneColumn ? 135.0 : 200.0;
+  return panels == 1 ? alone : 0.7 * alone;
+}
+
+namespace {
+
+/// Returns the points that the axes can show.
+std::vector<Point> Drawable(const Axis& x, const Axis& y, const Curve& curve) {
+  std::vector<Point> points;
+  for (std::size_t i = 0; i < std::min(curve.x.size(), curve.y.size()); ++i) {
+    if (x.CanShow(curve.x[i]) && y.CanShow(curve.y[i])) points.emplace_back(curve.x[i], curve.y[i]);
+  }
+  return points;
+}
+
+}  // namespace
+
+std::vector<Point> DrawnPoints(const PlotArea& area, const Curve& curve) {
+  const std::vector<Point> all = Drawable(area.x, area.y, curve);
+  return curve.line ? Decimated(area, all) : all;
+}
+
+PlotArea AreaOf(const Figure& panel, FigureSize size) {
+  AxisRange x(panel.log_x), y(panel.log_y);
+  const auto include = [&](const Point& point) {
+    x.Include(point.first);
+    y.Include(point.second);
+  };
+  for (const Curve& curve : panel.curves) {
+    std::ranges::for_each(
+        Drawable({.logarithmic = panel.log_x}, {.logarithmic = panel.log_y}, curve), include);
+    if (curve.ends_early && !curve.x.empty()) x.Include(curve.x.back());
+    std::ranges::for_each(curve.crosses, include);
+  }
+  const bool has_points = std::ranges::any_of(
+      panel.curves, [](const Curve& curve) { return curve.points || !curve.crosses.empty(); });
+  PlotArea area{.x = x.WithMargin(has_points ? 0.04 : 0.0),
+                .y = y.WithMargin(has_points ? 0.08 : 0.04),
+                .width = WidthOfPage(size) - 80.0,
+                .height = HeightOfPanel(size, 1)};
+  if (!panel.x_ticks.empty()) {
+    area.x = {.low = 0.5, .high = static_cast<double>(panel.x_ticks.size()) + 0.5};
+  }
+  return area;
+}
+
+namespace {
+
+bool MayMerge(const Curve& curve) {
+  return curve.merges && !curve.label.empty() && !curve.ends_early;
+}
+
+/// Keeps the style of `one` where `other` has the same, else black, solid, unmarked.
+void KeepCommon(const CurveStyle& other, CurveStyle* one) {
+  const CurveStyle several;
+  if (one->color != other.color) one->color = several.color;
+  if (one->dash != other.dash) one->dash = several.dash;
+  if (one->shape != other.shape) one->shape = several.shape;
+  one->width = std::max(one->width, other.width);
+}
+
+}  // namespace
+
+std::vector<Curve> MergedCurves(const Figure& panel, FigureSize size) {
+  const PlotArea area = AreaOf(panel, size);
+  struct Group {
+    Curve curve;
+    std::vector<Point> points;
+    std::vector<std::string> labels;
+  };
+  std::vector<Group> groups;
+  std::vector<Curve> failures;  // they keep the colour of their curves
+  std::vector<std::string> all;
+  for (Curve curve : panel.curves) {
+    if (curve.merges && !curve.label.empty()) all.push_back(curve.label);
+    const std::vector<Point> points = DrawnPoints(area, curve);
+    const auto same = std::ranges::find_if(groups, [&](const Group& group) {
+      return MayMerge(curve) && MayMerge(group.curve) && curve.line == group.curve.line &&
+             curve.style.flagged == group.curve.style.flagged &&
+             Coincide(area, points, group.points, curve.line);
+    });
+    if (same == groups.end()) {
+      groups.push_back({curve, points, {curve.label}});
+      continue;
+    }
+    Curve& merged = same->curve;
+    AddOnce(same->labels, curve.label);
+    for (Curve* one : {&merged, &curve}) {
+      if (one->crosses.empty()) continue;
+      failures.push_back({.style = one->style, .merges = false});
+      failures.back().crosses.swap(one->crosses);
+    }
+    merged.hollow.insert(merged.hollow.end(), curve.hollow.begin(), curve.hollow.end());
+    KeepCommon(curve.style, &merged.style);
+    if (merged.remark.ends_with('?') && !curve.remark.ends_with('?')) {
+      merged.remark = curve.remark;  // the resolved one
+      merged.guide = curve.guide;
+    }
+  }
+  std::vector<Curve> drawn;
+  for (Group& group : groups) {
+    group.curve.several = group.labels.size() > 1;
+    if (group.curve.several) group.curve.label = LabelOfSeveral(group.labels, all);
+    drawn.push_back(std::move(group.curve));
+  }
+  drawn.insert(drawn.end(), failures.begin(), failures.end());
+  return drawn;
 }
 
 }  // namespace loopbench::harness

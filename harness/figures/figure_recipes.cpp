@@ -22,7 +22,6 @@ namespace {
 
 constexpr const char* kNeutral = "#707070";  // for samples whose meaning is not their hue
 
-/// Returns the legend item of a channel for a run.
 LegendItem ItemOf(const Record& record, std::string_view key) {
   const CurveStyle style = StyleOf(record);
   LegendItem item{.text = record.Text(key), .style = {.color = kNeutral}};
@@ -36,7 +35,6 @@ LegendItem ItemOf(const Record& record, std::string_view key) {
   return item;
 }
 
-/// Returns one item per value, in the order of the records.
 LegendRow ItemsOf(std::span<const Record> records, const std::string& key) {
   LegendRow row;
   for (const Record& record : records) {
@@ -57,11 +55,6 @@ CurveStyle DistinctStyle(std::size_t index) {
   constexpr std::array<Shape, 5> kShapes = {Shape::kCircle, Shape::kTriangle, Shape::kSquare,
                                             Shape::kDiamond, Shape::kTriangleDown};
   return {.color = kPalette[index % kPalette.size()], .shape = kShapes[index % kShapes.size()]};
-}
-
-bool Varies(std::span<const Record> records, const std::string& key) {
-  return std::ranges::any_of(
-      records, [&](const Record& record) { return record.Text(key) != records[0].Text(key); });
 }
 
 CurveStyle StyleOf(const Record& record) {
@@ -90,19 +83,28 @@ Curve CurveOverTime(const Record& record, const std::string& x, const std::strin
 std::string MethodLabel(const Record& record, std::span<const Record> all) {
   std::string label;
   for (const char* key : kChannelKeys) {
-    if (Varies(all, key)) label += (label.empty() ? "" : ", ") + record.Text(key);
+    if (!IsAlike(all, key)) label += (label.empty() ? "" : ", ") + record.Text(key);
   }
   return label.empty() ? record.Text("formulation") : label;
+}
+
+void AddRunsOverTime(std::span<const Record> records, const std::string& x, const std::string& y,
+                     Figure* figure) {
+  if (!records.empty()) figure->legend = ChannelLegend(records);
+  for (const Record& record : records) {
+    figure->curves.push_back(
+        CurveOverTime(record, x, y, MethodLabel(record, records), StyleOf(record)));
+  }
 }
 
 std::vector<LegendRow> ChannelLegend(std::span<const Record> records) {
   std::vector<LegendRow> rows;
   if (LegendRow hues = ItemsOf(records, "formulation"); !hues.empty())
     rows.push_back(std::move(hues));
-  if (Varies(records, "enforcement")) rows.push_back(ItemsOf(records, "enforcement"));
+  if (!IsAlike(records, "enforcement")) rows.push_back(ItemsOf(records, "enforcement"));
   LegendRow others;
   for (const char* key : {"coordinates", "solver"}) {
-    if (!Varies(records, key)) continue;
+    if (IsAlike(records, key)) continue;
     for (LegendItem& item : ItemsOf(records, key)) others.push_back(std::move(item));
   }
   if (!others.empty()) rows.push_back(std::move(others));
@@ -131,34 +133,10 @@ std::string TitleOf(std::span<const Record> records, std::string_view what) {
   if (records.empty()) return std::string(what);
   std::string title = fmt::format("{}: {}", records[0].Text("mechanism"), what);
   for (const char* key : {"enforcement", "coordinates", "solver"}) {
-    if (!Varies(records, key)) title += ", " + records[0].Text(key);
+    if (IsAlike(records, key)) title += ", " + records[0].Text(key);
   }
-  if (!Varies(records, "rtol") && !Varies(records, "step")) title += ", " + StepsOf(records[0]);
+  if (IsAlike(records, "rtol") && IsAlike(records, "step")) title += ", " + StepsOf(records[0]);
   return title;
-}
-
-Figure FigureOfDrift(std::span<const Record> records, std::string_view what, bool with_fit) {
-  Figure figure{.title = TitleOf(records, what),
-                .x_label = "time [s]",
-                .y_label = "position drift, running maximum [m]",
-                .log_x = with_fit,
-                .log_y = true};
-  if (!records.empty()) figure.legend = ChannelLegend(records);
-  for (const Record& record : records) {
-    Curve curve = CurveOverTime(record, "series.drift_t", "series.drift",
-                                MethodLabel(record, records), StyleOf(record));
-    if (with_fit) curve.remark = FittedPower(record);
-    if (curve.ends_early) {
-      curve.remark += fmt::format("{}{} at {} s", curve.remark.empty() ? "" : ", ",
-                                  record.Text("outcome"), NumberText(record.Number("t_reached")));
-    }
-    if (with_fit && record.Text("growth_resolved") == "true") {
-      curve.guide = {record.Number("growth_exponent"), record.Number("growth_from"),
-                     record.Number("growth_to")};
-    }
-    figure.curves.push_back(std::move(curve));
-  }
-  return figure;
 }
 
 // Kind of joint coordinates: names and labels of their series. Angles and lengths have no common
@@ -206,9 +184,8 @@ std::string RunOf(const Record& record) {
     if (!record.Text(key).empty()) text += ", " + record.Text(key);
   }
   text += ", " + StepsOf(record);
-  for (const TableColumn& parameter : WithParameters({}, {&record, 1})) {
-    if (parameter.key == "step") continue;
-    text += fmt::format(", {} {}", parameter.key, record.Text(parameter.key));
+  for (const std::string& key : ParametersOf({&record, 1})) {
+    if (key != "step") text += fmt::format(", {} {}", key, record.Text(key));
   }
   return text;
 }
@@ -218,9 +195,9 @@ std::string RunOf(const Record& record) {
 std::map<std::vector<std::string>, std::vector<Record>> ByOtherKeys(
     std::span<const Record> records) {
   std::vector<std::string> keys = {"integrator", "experiment"};
-  for (const TableColumn& parameter : WithParameters({}, records)) keys.push_back(parameter.key);
+  for (const std::string& key : ParametersOf(records)) keys.push_back(key);
   std::erase_if(keys,
-                [&](const std::string& key) { return key == "step" || !Varies(records, key); });
+                [&](const std::string& key) { return key == "step" || IsAlike(records, key); });
   std::map<std::vector<std::string>, std::vector<Record>> groups;
   for (const Record& record : records) {
     groups[Mapped<std::string>(keys, [&](const std::string& key) {
@@ -273,12 +250,27 @@ Figure MotionFigure(const Record& record) {
   return figure;
 }
 
-Figure DriftFigure(std::span<const Record> records) {
-  return FigureOfDrift(records, "drift", true);
-}
-
-Figure SingularFigure(std::span<const Record> records) {
-  return FigureOfDrift(records, "drift through singular positions", false);
+Figure DriftFigure(std::span<const Record> records, bool singular) {
+  Figure figure{.title = TitleOf(records, singular ? "drift through singular positions" : "drift"),
+                .x_label = "time [s]",
+                .y_label = "position drift, running maximum [m]",
+                .log_x = !singular,
+                .log_y = true};
+  AddRunsOverTime(records, "series.drift_t", "series.drift", &figure);
+  for (std::size_t i = 0; i < records.size(); ++i) {
+    const Record& record = records[i];
+    Curve& curve = figure.curves[i];
+    if (!singular) curve.remark = FittedPower(record);
+    if (curve.ends_early) {
+      curve.remark += fmt::format("{}{} at {} s", curve.remark.empty() ? "" : ", ",
+                                  record.Text("outcome"), NumberText(record.Number("t_reached")));
+    }
+    if (!singular && record.Text("growth_resolved") == "true") {
+      curve.guide = {record.Number("growth_exponent"), record.Number("growth_from"),
+                     record.Number("growth_to")};
+    }
+  }
+  return figure;
 }
 
 std::vector<NamedFigure> AllFigures(std::span<const Record> records) {
@@ -308,7 +300,7 @@ std::vector<NamedFigure> AllFigures(std::span<const Record> records) {
   for (const auto& [name, group] : drift) {
     const bool singular = std::ranges::any_of(group, PassesSingularPosition);
     for (auto& [others, own] : ByOtherKeys(group)) {
-      Figure figure = singular ? SingularFigure(own) : DriftFigure(own);
+      Figure figure = DriftFigure(own, singular);
       for (const std::string& text : others) figure.title += ", " + text;
       figures.push_back({fmt::format("{}-{}{}{}", singular ? "singular" : "drift", name,
                                      others.empty() ? "" : "-", fmt::join(others, "-")),
@@ -337,7 +329,6 @@ Curve CurveOf(std::span<const Record> rungs, Scalar scalar, const char* key) {
   return curve;
 }
 
-/// Makes a curve for each scalar that has runs.
 Figure PanelOf(std::span<const Record> rungs, const char* key, const char* axis) {
   Figure panel{.title = "", .x_label = "tolerance", .y_label = axis, .log_x = true, .log_y = true};
   for (std::size_t i = 0; i < kNames<Scalar>.size(); ++i) {
@@ -349,23 +340,21 @@ Figure PanelOf(std::span<const Record> rungs, const char* key, const char* axis)
 
 NamedFigure FigureOf(std::span<const Record> rungs) {
   const Record& first = rungs.front();
-  NamedFigure named;
-  named.name = "precision";
+  NamedFigure named{"precision", PanelOf(rungs, "error_final", "error at the end [m]")};
   for (const char* key : kLadderKeys) {
     const std::string_view word = key;
     const bool in_name = word != "horizon" && word != "experiment" && word != "config_hash";
     if (in_name) named.name += "-" + first.Text(key);
   }
   Figure& figure = named.figure;
-  figure = PanelOf(rungs, "error_final", "error at the end [m]");
   figure.below = {PanelOf(rungs, "drift_position_max", "largest drift [m]")};
   figure.title =
       fmt::format("{}: {}, {}, {}, {}, after {} s", first.Text("mechanism"),
                   first.Text("formulation"), first.Text("enforcement"), first.Text("coordinates"),
                   first.Text("solver"), first.Text("horizon"));
-  for (const TableColumn& parameter : WithParameters({}, {&first, 1})) {
-    named.name += fmt::format("-{}-{}", parameter.key, first.Text(parameter.key));
-    figure.title += fmt::format(", {} {}", parameter.key, first.Text(parameter.key));
+  for (const std::string& key : ParametersOf({&first, 1})) {
+    named.name += fmt::format("-{}-{}", key, first.Text(key));
+    figure.title += fmt::format(", {} {}", key, first.Text(key));
   }
   figure.legend.resize(figure.curves.empty() ? 0 : 1);
   for (const Curve& curve : figure.curves) {
@@ -381,14 +370,11 @@ std::vector<NamedFigure> PrecisionFigures(std::span<const Record> records) {
   SortSweepLevels(&sorted);
   std::vector<NamedFigure> figures;
   std::vector<std::string> others, contents;  // other keys that distinguish ladders
-  for (std::size_t begin = 0; begin < sorted.size();) {
-    std::size_t end = begin;
-    while (end < sorted.size() && LadderOf(sorted[end]) == LadderOf(sorted[begin])) ++end;
-    figures.push_back(FigureOf(std::span(sorted).subspan(begin, end - begin)));
-    others.push_back(
-        fmt::format("-{}s-{}", sorted[begin].Text("horizon"), sorted[begin].Text("experiment")));
-    contents.push_back("-" + sorted[begin].Text("config_hash"));
-    begin = end;
+  for (const auto& [ladder, rungs] : GroupBy(sorted, LadderOf)) {
+    const Record& first = rungs.front();
+    figures.push_back(FigureOf(rungs));
+    others.push_back(fmt::format("-{}s-{}", first.Text("horizon"), first.Text("experiment")));
+    contents.push_back("-" + first.Text("config_hash"));
   }
   for (const std::vector<std::string>& endings : {others, contents}) {
     std::map<std::string, int> uses;

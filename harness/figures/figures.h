@@ -5,7 +5,6 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
-#include <cstdint>
 #include <filesystem>
 #include <limits>
 #include <optional>
@@ -65,9 +64,9 @@ struct Tick {
   std::string label;  ///< "" for a small tick
 };
 
-/// Returns about `most` labelled ticks and the small ones between them. A logarithmic axis with
-/// three powers of ten has these. A shorter one has 1, 2 and 5 or other digits of each decade. A
-/// linear axis has multiples of 1, 2 or 5 of a power of ten.
+/// Returns about `most` labelled ticks and the small ones between them: multiples of 1, 2 or 5 of a
+/// power of ten; on a logarithmic axis powers of ten, or digits of each decade if it has fewer than
+/// three.
 std::vector<Tick> Ticks(const Axis& axis, int most);
 
 /// A place in a drawing [pt], or a pair of values.
@@ -84,7 +83,7 @@ struct PlotArea {
 };
 
 /// Returns the first, last, lowest and highest point of each column that is a third of a curve
-/// wide. Omitted points lie between kept ones. Points need not be in order of x.
+/// wide. Points need not be in order of x.
 std::vector<Point> Decimated(const PlotArea& area, std::span<const Point> points);
 
 /// True if every point of each curve lies within a drawn width of the other's line, or of its
@@ -157,8 +156,8 @@ struct Figure {
   std::vector<Curve> curves = {};  ///< later ones lie on top
   std::string legend_title = "";
   std::vector<std::string> x_ticks = {};  ///< names of x = 1, 2, ...; empty for a numeric scale
-  /// Meaning of colours, dashes and marks, one entry per row. Without them curves are named: up to
-  /// kLegendRows of them in the legend, else at their ends.
+  /// Meaning of colours, dashes and marks. Without them curves are named: up to kLegendRows of them
+  /// in the legend, else at their ends.
   std::vector<LegendRow> legend = {};
   bool names_at_ends = false;      ///< also with a legend
   std::vector<Figure> below = {};  ///< further panels with the same x axis; only `curves`,
@@ -177,18 +176,24 @@ enum class FigureSize { kOneColumn, kTwoColumn };
 /// with others, curves that end early never. Points keep hollow marks, crosses their colours.
 std::vector<Curve> MergedCurves(const Figure& panel, FigureSize size);
 
-/// The gnuplot commands and data of a figure, for any terminal (neither terminal nor output are
-/// set), and its height [pt].
-struct FigureScript {
-  std::string commands;
-  double height = 0.0;
-  std::size_t legend_rows = 0;
-  bool is_empty = true;  ///< no curve has a point to draw
+/// Size of a drawing [pt].
+struct GnuplotPage {
+  double width = 504.0, height = 260.0;
 };
-FigureScript GnuplotScript(const Figure& figure, FigureSize size = FigureSize::kTwoColumn);
 
-/// Draws `figure` into `path` as DrawWithGnuplot() does; a figure without a point to draw is a
-/// reason, too. Equal figures give equal bytes of SVG; a PDF contains its date.
+/// A drawing by gnuplot: its page, and commands and data for any terminal.
+struct Drawing {
+  GnuplotPage page;
+  std::string script = {};
+  bool is_empty = false;  ///< no curve has a point to draw
+  std::size_t legend_rows = 0;
+};
+
+/// Returns the drawing of a figure.
+Drawing GnuplotScript(const Figure& figure, FigureSize size = FigureSize::kTwoColumn);
+
+/// Draws `figure` into `path` as DrawWithGnuplot() does. Equal figures give equal bytes of SVG; a
+/// PDF contains its date.
 [[nodiscard]] std::optional<std::string> WriteFigure(const std::filesystem::path& path,
                                                      const Figure& figure,
                                                      FigureSize size = FigureSize::kTwoColumn,
@@ -224,8 +229,9 @@ std::string MethodLabel(const Record& record, std::span<const Record> all);
 /// solvers appear only if they vary.
 std::vector<LegendRow> ChannelLegend(std::span<const Record> records);
 
-/// True if the values of a key differ.
-bool Varies(std::span<const Record> records, const std::string& key);
+/// Adds a curve of two series for each run in the style of its method, and the legend.
+void AddRunsOverTime(std::span<const Record> records, const std::string& x, const std::string& y,
+                     Figure* figure);
 
 /// A figure and the name of its file without extension.
 struct NamedFigure {
@@ -240,19 +246,16 @@ struct NamedFigure {
 Figure MotionFigure(const Record& record);
 
 /// Drift [m] of several runs of one mechanism against time on logarithmic axes: the running maximum
-/// "series.drift" against "series.drift_t", in the styles of all figures. At the end of a curve is
-/// the fitted power with its spread, and '?' if it is not resolved. A thin line shows a resolved
-/// power over its fit window. A failed run ends in a cross with its outcome.
-Figure DriftFigure(std::span<const Record> records);
+/// "series.drift" against "series.drift_t". At the end of a curve is the fitted power with its
+/// spread, and '?' if it is not resolved; a thin line shows a resolved power over its fit window. A
+/// failed run ends in a cross with its outcome. `singular`: on a linear time axis, without fits,
+/// for the effect of passing a singular configuration.
+Figure DriftFigure(std::span<const Record> records, bool singular = false);
 
-/// Drift on a linear time axis, without fits: effect of passing a singular configuration.
-Figure SingularFigure(std::span<const Record> records);
-
-/// All figures of the records with series. Each mechanism and horizon has the motion of one run:
-/// finished, without warnings, at level projection, at the finest tolerance, if possible. Each
-/// mechanism, horizon and tolerance has a drift figure, or one of singular configurations if a run
-/// came near one. Runs that differ in integrator, experiment or a parameter have separate figures,
-/// named with its value.
+/// All figures of the records with series. Each mechanism and horizon has the motion of one run,
+/// the most reliable. Each mechanism, horizon and tolerance has a drift figure, or one of singular
+/// configurations if a run came near one. Runs that differ in integrator, experiment or a parameter
+/// have separate figures, named with its value.
 std::vector<NamedFigure> AllFigures(std::span<const Record> records);
 
 /// Draws error (lines) and drift (dashes) of each ladder against tolerance, one colour per scalar.
@@ -329,11 +332,6 @@ class DistinctPoints {
 /// Letter size of all drawings [pt], distance of their lines and mean width of letters.
 inline constexpr double kLetterSize = 8.0, kLineHeight = 10.0, kLetterWidth = 4.2;
 
-/// Size of a drawing [pt].
-struct GnuplotPage {
-  double width = 504.0, height = 260.0;
-};
-
 /// Converts millimetres to points of 1/72 inch.
 constexpr double PointsOf(double millimetres) { return millimetres * 72.0 / 25.4; }
 
@@ -348,14 +346,13 @@ std::vector<std::string> Wrapped(const std::string& text, std::size_t most);
 std::string TextAt(const GnuplotPage& page, std::string_view text, double x, double y,
                    std::string_view options);
 
-/// Runs `script`, which sets neither terminal nor output and quotes its texts with QuoteGnuplot(),
-/// by the program `gnuplot` without a shell. Writes `path`, as PDF if its extension is ".pdf", else
-/// as SVG. Returns nothing on success, else the reason: gnuplot missing (and its package) or its
-/// own message. The file is complete or absent. No other files remain, even if this process is
-/// killed.
+/// Runs the script of a drawing, which sets neither terminal nor output and quotes its texts with
+/// QuoteGnuplot(), by the program `gnuplot` without a shell. Writes `path`, as PDF if its extension
+/// is ".pdf", else as SVG. Returns nothing on success, else the reason: nothing to draw, gnuplot
+/// missing (and its package), or its own message. The file is complete or absent. No other files
+/// remain, even if this process is killed.
 [[nodiscard]] std::optional<std::string> DrawWithGnuplot(const std::filesystem::path& path,
-                                                         const GnuplotPage& page,
-                                                         const std::string& script,
+                                                         const Drawing& drawing,
                                                          const std::string& gnuplot = "gnuplot");
 
 double WidthOfPage(FigureSize size);
@@ -363,11 +360,20 @@ double WidthOfPage(FigureSize size);
 /// Returns gnuplot's "lc ... dt ... lw ..." of a curve's line.
 std::string LineLook(const CurveStyle& style);
 
+/// Returns the axes of a panel and its approximate size.
+PlotArea AreaOf(const Figure& panel, FigureSize size);
+
+/// Returns the points of a curve that are drawn.
+std::vector<Point> DrawnPoints(const PlotArea& area, const Curve& curve);
+
+/// Returns the height of each of so many panels [pt].
+double HeightOfPanel(FigureSize size, std::size_t panels);
+
 /// Result of a method in all rows of a group.
 struct FoldedCell {
   CellState worst = CellState::kNotApplicable;  ///< worst of the applicable rows
   std::size_t holding = 0, judged = 0;          ///< numbers of applicable rows
-  bool with_warnings = false;                   ///< a row holds with warnings (HoldsWithWarnings)
+  bool with_warnings = false;                   ///< a row holds with warnings
   bool fails_demand = false;                    ///< a row must hold and does not
 
   /// Fraction of the applicable rows that hold; 1 if all do.
@@ -385,23 +391,10 @@ struct FoldedGroup {
 /// Returns the groups of a map, in ascending order of the fraction that holds.
 std::vector<FoldedGroup> Folded(const RobustnessMap& map);
 
-/// A drawing: gnuplot's commands and the page they are for.
-struct MapDrawing {
-  GnuplotPage page;
-  std::string script;
-};
-
 /// Draws groups from top to bottom, methods from left to right, a legend below. Darker cells have
-/// fewer rows that hold; the glyph shows how the worst row ended. There are no hues. Cells with a
-/// required row that does not hold have a frame. Rows, numbers and reasons are in robustness-map.md
-/// and .csv.
-MapDrawing DrawMap(const RobustnessMap& map, FigureSize size = FigureSize::kTwoColumn);
-
-/// Draws into `path` as DrawWithGnuplot() does.
-[[nodiscard]] std::optional<std::string> WriteMapFigure(const std::filesystem::path& path,
-                                                        const RobustnessMap& map,
-                                                        FigureSize size = FigureSize::kTwoColumn,
-                                                        const std::string& gnuplot = "gnuplot");
+/// fewer rows that hold; the glyph shows how the worst row ended. Cells with a required row that
+/// does not hold have a frame.
+Drawing DrawMap(const RobustnessMap& map, FigureSize size = FigureSize::kTwoColumn);
 
 /// Error over cost on logarithmic axes. Marks are the runs: hue for the formulation, shape for the
 /// coordinates, hollow with warnings. A line, dashed by level, joins the runs that no other run of

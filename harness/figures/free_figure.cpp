@@ -2,9 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
+#include <ranges>
 #include <set>
-#include <string_view>
 #include <utility>
 
 #include "harness/base/record.h"
@@ -16,13 +15,10 @@
 namespace loopbench::harness {
 namespace {
 
-/// Splits the keys in "a,b".
 std::vector<std::string> KeysIn(const std::string& list) {
   std::vector<std::string> parts;
-  for (std::size_t from = 0; from < list.size();) {
-    const std::size_t comma = std::min(list.find(',', from), list.size());
-    if (comma > from) parts.push_back(list.substr(from, comma - from));
-    from = comma + 1;
+  for (const auto part : std::views::split(list, ',')) {
+    if (!part.empty()) parts.emplace_back(part.begin(), part.end());
   }
   return parts;
 }
@@ -33,7 +29,6 @@ const T* FindAs(const Record& record, const std::string& key) {
   return value == nullptr ? nullptr : std::get_if<T>(value);
 }
 
-/// Formats numbers as in all figures.
 std::string ValueText(const Record& record, const std::string& key) {
   const auto* number = FindAs<double>(record, key);
   return number == nullptr ? record.Text(key) : NumberText(*number);
@@ -83,7 +78,7 @@ std::string TitleOf(std::span<const Record> rows, const FreeFigure& wanted) {
   if (wanted.title) return *wanted.title;
   std::string common;
   for (const std::string key : kCaseKeys) {
-    if (key == wanted.x || Varies(rows, key) || rows[0].Text(key).empty()) continue;
+    if (key == wanted.x || !IsAlike(rows, key) || rows[0].Text(key).empty()) continue;
     const bool is_text = IsText(rows[0], key);
     common += fmt::format("{}{}{}", common.empty() ? ": " : ", ", is_text ? "" : key + " ",
                           ValueText(rows[0], key));
@@ -232,43 +227,23 @@ std::ptrdiff_t LeaveGaps(Figure& figure) {
   return omitted;
 }
 
-using Group = std::pair<std::string, std::vector<Record>>;  // label and members
-
-/// Groups rows that are sorted by `keys`.
-std::vector<Group> GroupsOf(std::span<const Record> rows, std::span<const std::string> keys) {
-  std::vector<Group> groups;
-  for (const Record& row : rows) {
-    const std::string label =
-        Joined(keys, ", ", [&](const std::string& key) { return ValueText(row, key); });
-    if (groups.empty() || groups.back().first != label) groups.push_back({label, {}});
-    groups.back().second.push_back(row);
-  }
-  return groups;
-}
-
-/// Replaces the texts of axes and curves.
 void Relabel(const FreeFigure& wanted, Figure* figure) {
-  const Figure given = *figure;  // texts are no names for later labels
+  std::vector<std::pair<std::string, std::string*>> texts = {{wanted.x, &figure->x_label},
+                                                             {wanted.y, &figure->y_label}};
+  for (Curve& curve : figure->curves) texts.emplace_back(curve.label, &curve.label);
+  for (LegendRow& row : figure->legend) {
+    for (LegendItem& item : row) texts.emplace_back(item.text, &item.text);
+  }
   for (const std::string& label : wanted.labels) {
-    const std::size_t cut = label.find('=');
+    const std::size_t cut = std::min(label.find('='), label.size());
     const std::string name = label.substr(0, cut);
-    const std::string text = cut == std::string::npos ? "" : label.substr(cut + 1);
     bool found = false;
-    const auto put = [&](bool is_named, std::string* shown) {
-      if (is_named) *shown = text;
-      found = found || is_named;
-    };
-    put(name == wanted.x, &figure->x_label);
-    put(name == wanted.y, &figure->y_label);
-    for (std::size_t i = 0; i < given.curves.size(); ++i) {
-      put(!name.empty() && given.curves[i].label == name, &figure->curves[i].label);
+    for (const auto& [named, text] : texts) {
+      if (cut == label.size() || name.empty() || named != name) continue;
+      *text = label.substr(cut + 1);
+      found = true;
     }
-    for (std::size_t r = 0; r < given.legend.size(); ++r) {
-      for (std::size_t i = 0; i < given.legend[r].size(); ++i) {
-        put(!name.empty() && given.legend[r][i].text == name, &figure->legend[r][i].text);
-      }
-    }
-    if (cut == std::string::npos || !found) {
+    if (!found) {
       throw ConfigError(fmt::format(
           "--label {}: expected NAME=TEXT, where NAME is {}, {} or the label of a curve", label,
           wanted.x, wanted.y));
@@ -324,7 +299,7 @@ FreeFigureResult MakeFreeFigure(std::span<const Record> records, const FreeFigur
   for (auto key = group_keys.rbegin(); key != group_keys.rend(); ++key) {
     SortRowsBy(&rows, *key, false);
   }
-  const std::vector<Group> groups = GroupsOf(rows, group_keys);
+  const auto groups = GroupBy(rows, [&](const Record& row) { return ValuesOf(row, group_keys); });
 
   FreeFigureResult result;
   Figure& figure = result.figure;
@@ -333,7 +308,7 @@ FreeFigureResult MakeFreeFigure(std::span<const Record> records, const FreeFigur
   figure.y_label = ColumnOf(wanted.y, rows).header;
   if (HaveChannels(group_keys) && groups.size() > kLegendRows) {
     figure.legend = ChannelLegend(Mapped<Record>(
-        groups, [&](const Group& group) { return Only(group_keys, group.second.front()); }));
+        groups, [&](const auto& group) { return Only(group_keys, group.second.front()); }));
   }
   if (!group_keys.empty()) {
     figure.legend_title = fmt::format("curves by {}", fmt::join(group_keys, ", "));
@@ -341,10 +316,12 @@ FreeFigureResult MakeFreeFigure(std::span<const Record> records, const FreeFigur
   figure.x_ticks = TextsOf(rows, wanted.x);
   const bool is_series = IsSeries(rows[0], wanted.x);
   std::vector<std::string> telling(kCaseKeys.begin(), kCaseKeys.end());
-  for (const TableColumn& parameter : WithParameters({}, rows)) telling.push_back(parameter.key);
+  std::ranges::copy(ParametersOf(rows), std::back_inserter(telling));
   std::set<std::string> mixed;
   for (std::size_t g = 0; g < groups.size(); ++g) {
-    const auto& [label, members] = groups[g];
+    const auto& members = groups[g].second;
+    const std::string label = Joined(
+        group_keys, ", ", [&](const std::string& key) { return ValueText(members.front(), key); });
     for (std::size_t i = 0; is_series && i < members.size(); ++i) {
       CurveStyle style = StyleBy(group_keys, members[i], g);
       style.flagged = HasWarning(members[i]);
@@ -353,7 +330,7 @@ FreeFigureResult MakeFreeFigure(std::span<const Record> records, const FreeFigur
     }
     if (!is_series) figure.curves.push_back(ValueCurve(members, wanted, figure.x_ticks, label, g));
     for (const std::string& key : telling) {
-      if (key != wanted.x && key != wanted.y && Varies(members, key)) mixed.insert(key);
+      if (key != wanted.x && key != wanted.y && !IsAlike(members, key)) mixed.insert(key);
     }
   }
   JoinPoints(figure);

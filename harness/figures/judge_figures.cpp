@@ -11,6 +11,7 @@
 
 #include "harness/base/text.h"
 #include "harness/figures/figures.h"
+#include "harness/judge/analysis.h"
 #include "harness/judge/tables.h"
 
 namespace loopbench::harness {
@@ -79,7 +80,7 @@ class MapPainter {
     page_.height = std::round(height());
   }
 
-  MapDrawing Draw() {
+  Drawing Draw() {
     double y = page_.height - kMargin - 0.5 * kLineHeight;
     Text(map_.rules.title, kMargin, y, "left");
     y -= 0.5 * kLineHeight + head_height_;
@@ -154,7 +155,6 @@ class MapPainter {
          y + 0.5 * cell_height_, "left");
   }
 
-  // Draws rows: first shades, then the glyphs in use.
   void DrawLegend(double y) {
     const double left = kMargin;
     double x = left;
@@ -234,8 +234,8 @@ std::vector<FoldedGroup> Folded(const RobustnessMap& map) {
           folded.worst = folded.judged == 0 ? cell.state : std::max(folded.worst, cell.state);
           ++folded.judged;
         }
-        folded.holding += cell.state == CellState::kHolds ? 1 : 0;
-        folded.with_warnings = folded.with_warnings || HoldsWithWarnings(cell);
+        folded.holding += cell.state == CellState::kHolds;
+        folded.with_warnings = folded.with_warnings || cell.HoldsWithWarnings();
         folded.fails_demand =
             folded.fails_demand || (cell.demanded && cell.state != CellState::kHolds);
       }
@@ -245,30 +245,16 @@ std::vector<FoldedGroup> Folded(const RobustnessMap& map) {
   return groups;
 }
 
-MapDrawing DrawMap(const RobustnessMap& map, FigureSize size) {
-  return MapPainter(map, size).Draw();
-}
+Drawing DrawMap(const RobustnessMap& map, FigureSize size) { return MapPainter(map, size).Draw(); }
 
-std::optional<std::string> WriteMapFigure(const std::filesystem::path& path,
-                                          const RobustnessMap& map, FigureSize size,
-                                          const std::string& gnuplot) {
-  const MapDrawing drawing = DrawMap(map, size);
-  return DrawWithGnuplot(path, drawing.page, drawing.script, gnuplot);
-}
 namespace {
-
-constexpr double kNowhere = std::numeric_limits<double>::quiet_NaN();
 
 using Rows = std::vector<const WorkPrecisionRow*>;
 
 /// Groups rows that agree in these keys, in the order of the figure's rows.
 std::map<std::string, Rows> RowsBy(std::span<const char* const> keys, const Rows& rows) {
   std::map<std::string, Rows> groups;
-  for (const WorkPrecisionRow* row : rows) {
-    std::string name;
-    for (const char* key : keys) name += row->record.Text(key) + '\n';
-    groups[name].push_back(row);
-  }
+  for (const WorkPrecisionRow* row : rows) groups[ValuesOf(row->record, keys)].push_back(row);
   return groups;
 }
 
@@ -276,11 +262,11 @@ std::vector<Record> RecordsOf(const Rows& rows) {
   return Mapped<Record>(rows, &WorkPrecisionRow::record);
 }
 
+/// Returns the rows with an integrator, or with any ("").
 Rows RowsWith(const WorkPrecisionProblem& problem, const std::string& integrator) {
   Rows rows;
   for (const WorkPrecisionRow& row : problem.rows) {
-    const bool is_one = integrator.empty() || row.record.Text("integrator") == integrator;
-    if (is_one) rows.push_back(&row);
+    if (integrator.empty() || row.record.Text("integrator") == integrator) rows.push_back(&row);
   }
   return rows;
 }
@@ -300,10 +286,10 @@ void AddRuns(const Rows& rows, X x, Curve sound, Figure* figure) {
     if (HasFailed(row->record)) {
       if (!std::isfinite(at))
         at = std::isfinite(row->cost) ? row->cost : row->record.Number("cpu_s");
-      sound.crosses.emplace_back(at, kNowhere);
+      sound.crosses.emplace_back(at, kNoNumber);
       continue;
     }
-    Curve& curve = row->record.Text("warnings").empty() ? sound : flagged;
+    Curve& curve = HasWarning(row->record) ? flagged : sound;
     curve.x.push_back(at);
     curve.y.push_back(row->error);
   }
@@ -330,17 +316,15 @@ void AddBest(const Rows& rows, Figure* figure) {
   if (best.x.size() > 1) figure->curves.push_back(std::move(best));
 }
 
-/// Makes a figure of the error on logarithmic axes.
 Figure ErrorFigure(const std::string& title, const std::string& x_label,
                    const WorkPrecision& work_precision) {
   return {.title = title,
           .x_label = x_label,
-          .y_label = WithUnit(work_precision.error, work_precision.error),
+          .y_label = WithUnit(work_precision.error),
           .log_x = true,
           .log_y = true};
 }
 
-/// Makes a legend row for a line with its own meaning.
 LegendRow RowOf(const Curve& line) { return {{line.label, line.style}}; }
 
 /// Draws stairs: between two rows of the front, the cheaper one applies.
@@ -358,10 +342,10 @@ Curve Stairs(const WorkPrecisionProblem& problem) {
   return stairs;
 }
 
-std::vector<std::string> IntegratorsOfRows(const WorkPrecisionProblem& problem) {
+std::set<std::string> IntegratorsOf(const WorkPrecisionProblem& problem) {
   std::set<std::string> names;
   for (const WorkPrecisionRow& row : problem.rows) names.insert(row.record.Text("integrator"));
-  return {names.begin(), names.end()};
+  return names;
 }
 
 /// Draws vertical lines at the trust horizon: the smallest and, if runs differ, the largest.
@@ -398,7 +382,6 @@ bool HasPoint(const Curve& curve) {
   return false;
 }
 
-/// Makes a file name part: letters, digits and '-'.
 std::string Slug(const std::string& text) {
   std::string slug;
   for (const char c : text) {
@@ -414,11 +397,10 @@ std::string Slug(const std::string& text) {
 
 Figure WorkPrecisionFigure(const WorkPrecision& work_precision,
                            const WorkPrecisionProblem& problem) {
-  Figure figure = ErrorFigure(problem.name + ": error against cost",
-                              WithUnit(work_precision.cost, work_precision.cost), work_precision);
+  Figure figure = ErrorFigure(problem.name + ": error against cost", WithUnit(work_precision.cost),
+                              work_precision);
   const Rows rows = RowsWith(problem, "");
-  const std::vector<Record> records = RecordsOf(rows);
-  figure.legend = ChannelLegend(records);
+  figure.legend = ChannelLegend(RecordsOf(rows));
   constexpr const char* kHueAndMark[] = {"formulation", "coordinates"};
   constexpr const char* kHueAndDash[] = {"formulation", "enforcement"};
   const auto cost = [](const WorkPrecisionRow& row) { return row.cost; };
@@ -437,12 +419,10 @@ Figure ToleranceFigure(const WorkPrecision& work_precision, const WorkPrecisionP
       ErrorFigure(fmt::format("{}, {}: is the tolerance honoured?", problem.name, integrator),
                   "tolerance", work_precision);
   Rows rows = RowsWith(problem, integrator);
-  std::erase_if(rows,
-                [](const WorkPrecisionRow* row) { return std::isnan(row->record.Number("rtol")); });
-  if (rows.empty()) return figure;
   const auto rtol = [](const WorkPrecisionRow& row) { return row.record.Number("rtol"); };
-  std::ranges::stable_sort(rows, std::less(),
-                           [&](const WorkPrecisionRow* row) { return rtol(*row); });
+  std::erase_if(rows, [&](const auto* row) { return std::isnan(rtol(*row)); });
+  if (rows.empty()) return figure;
+  std::ranges::stable_sort(rows, std::less(), [&](const auto* row) { return rtol(*row); });
   const std::vector<Record> records = RecordsOf(rows);
   figure.legend = ChannelLegend(records);
   for (const auto& [name, own] : RowsBy(kChannelKeys, rows)) {
@@ -453,9 +433,9 @@ Figure ToleranceFigure(const WorkPrecision& work_precision, const WorkPrecisionP
       IsErrorOfPositions(work_precision.error) || UnitOf(ColumnOf(work_precision.error, {})) == "m";
   const double length = rows.front()->record.Number("link_length");
   const double scale = is_length && length > 0.0 ? length : 1.0;
-  Curve honoured{.label = is_length ? "error = tolerance x link" : "error = tolerance"};
-  honoured.style.width = 0.6;
-  honoured.merges = false;
+  Curve honoured{.label = is_length ? "error = tolerance x link" : "error = tolerance",
+                 .style = {.width = 0.6},
+                 .merges = false};
   for (const WorkPrecisionRow* row : {rows.front(), rows.back()}) {
     honoured.x.push_back(rtol(*row));
     honoured.y.push_back(scale * rtol(*row));
@@ -481,12 +461,7 @@ Figure ErrorOverTimeFigure(const WorkPrecisionProblem& problem, const std::strin
                 .y_label = "error of positions [m]",
                 .log_x = false,
                 .log_y = true};
-  const std::vector<Record> records = RecordsOf(rows);
-  if (!records.empty()) figure.legend = ChannelLegend(records);
-  for (const Record& record : records) {
-    figure.curves.push_back(CurveOverTime(record, "series.error_t", "series.error",
-                                          MethodLabel(record, records), StyleOf(record)));
-  }
+  AddRunsOverTime(RecordsOf(rows), "series.error_t", "series.error", &figure);
   for (Curve& line : TrustLines(rows, figure.curves)) {
     if (!line.label.empty()) figure.legend.push_back(RowOf(line));
     figure.curves.push_back(std::move(line));
@@ -505,29 +480,25 @@ double Slope(const Curve& curve) {
     sum_x += x, sum_y += y, sum_xx += x * x, sum_xy += x * y;
   }
   const double spread = n * sum_xx - sum_x * sum_x;
-  return spread > 1e-12 * n * sum_xx ? (n * sum_xy - sum_x * sum_y) / spread : kNowhere;
+  return spread > 1e-12 * n * sum_xx ? (n * sum_xy - sum_x * sum_y) / spread : kNoNumber;
 }
 
 /// Draws the error of one method, with a curve for each integrator: over the fixed step with the
 /// observed orders, or over the cost.
 Figure IntegratorsFigure(const WorkPrecision& work_precision, const std::string& title,
                          const Rows& rows, bool over_step) {
-  Figure figure = ErrorFigure(
-      title, over_step ? "step [s]" : WithUnit(work_precision.cost, work_precision.cost),
-      work_precision);
+  Figure figure =
+      ErrorFigure(title, over_step ? "step [s]" : WithUnit(work_precision.cost), work_precision);
   constexpr const char* kIntegrator[] = {"integrator"};
-  for (auto& [name, own] : RowsBy(kIntegrator, rows)) {
+  for (auto [name, own] : RowsBy(kIntegrator, rows)) {
     const std::string label = own.front()->record.Text("integrator");
     const auto x = [&](const WorkPrecisionRow& row) {
       return over_step ? row.record.Number("step") : row.cost;
     };
-    Rows sorted = own;
-    std::ranges::stable_sort(sorted, std::less(),
-                             [&](const WorkPrecisionRow* row) { return x(*row); });
-    const std::size_t before = figure.curves.size();
-    AddRuns(sorted, x, {.label = label, .style = DistinctStyle(before)}, &figure);
+    std::ranges::stable_sort(own, std::less(), [&](const auto* row) { return x(*row); });
+    AddRuns(own, x, {.label = label, .style = DistinctStyle(figure.curves.size())}, &figure);
     Curve& curve = figure.curves.back();
-    const double order = over_step ? Slope(curve) : kNowhere;
+    const double order = over_step ? Slope(curve) : kNoNumber;
     if (std::isfinite(order)) curve.label += fmt::format(", order {:.2f}", order);
   }
   return figure;
@@ -550,7 +521,7 @@ std::vector<NamedFigure> WorkPrecisionFigures(const WorkPrecision& work_precisio
   };
   for (const WorkPrecisionProblem& problem : work_precision.problems) {
     add("work-precision-", problem.name, WorkPrecisionFigure(work_precision, problem));
-    const bool several = IntegratorsOfRows(problem).size() > 1;
+    const bool several = IntegratorsOf(problem).size() > 1;
     const std::vector<Record> all = RecordsOf(RowsWith(problem, ""));
     for (const auto& [name, rows] : RowsBy(kChannelKeys, RowsWith(problem, ""))) {
       const std::string what =
@@ -564,11 +535,11 @@ std::vector<NamedFigure> WorkPrecisionFigures(const WorkPrecision& work_precisio
         add("integrators-", what,
             IntegratorsFigure(work_precision, what, adaptive.empty() ? fixed : adaptive, false));
       }
-      if (Varies(RecordsOf(fixed), "step")) {
+      if (!IsAlike(RecordsOf(fixed), "step")) {
         add("order-", what, IntegratorsFigure(work_precision, what + ": order", fixed, true));
       }
     }
-    for (const std::string& integrator : IntegratorsOfRows(problem)) {
+    for (const std::string& integrator : IntegratorsOf(problem)) {
       const std::string what = problem.name + " " + integrator;
       add("tolerance-", what, ToleranceFigure(work_precision, problem, integrator));
       add("error-", what, ErrorOverTimeFigure(problem, integrator));

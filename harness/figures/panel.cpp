@@ -6,6 +6,7 @@
 #include <cerrno>
 #include <cmath>
 #include <map>
+#include <numeric>
 #include <string_view>
 #include <utility>
 
@@ -69,13 +70,13 @@ std::string TextAt(const GnuplotPage& page, std::string_view text, double x, dou
 }
 
 std::optional<std::string> DrawWithGnuplot(const std::filesystem::path& path,
-                                           const GnuplotPage& page, const std::string& script,
-                                           const std::string& gnuplot) {
+                                           const Drawing& drawing, const std::string& gnuplot) {
+  if (drawing.is_empty) return fmt::format("{}: no curve has a point to draw", path.string());
   const bool pdf = path.extension() == ".pdf";
   // without the user's ~/.gnuplot, whose settings would change figures
   const ProgramResult run =
       RunProgram({gnuplot, "--default-settings"},
-                 fmt::format("set terminal {}\n{}", TerminalOf(page, pdf), script));
+                 fmt::format("set terminal {}\n{}", TerminalOf(drawing.page, pdf), drawing.script));
   if (run.error != 0) {
     return fmt::format("{}: {}{}", path.string(), run.Failure(gnuplot),
                        run.error == ENOENT ? "; install gnuplot-nox" : "");
@@ -83,7 +84,7 @@ std::optional<std::string> DrawWithGnuplot(const std::filesystem::path& path,
   if (run.status != 0 || run.output.empty()) {
     return fmt::format("{}: gnuplot failed: {}", path.string(), run.messages);
   }
-  WriteFileAtomically(path, pdf ? run.output : InMillimetres(run.output, page));
+  WriteFileAtomically(path, pdf ? run.output : InMillimetres(run.output, drawing.page));
   return std::nullopt;
 }
 
@@ -108,7 +109,6 @@ namespace {
 
 constexpr const char* kCrossLook = "pt 2 ps 0.45 lw 1.2";
 
-/// Returns gnuplot's "pt ... ps ... lc ..." of the marks of a curve.
 std::string MarkLook(const CurveStyle& style) {
   constexpr std::array kOpen = {6, 6, 8, 4, 12, 10};  // in the order of Shape; filled is the next
   const int open = kOpen[static_cast<std::size_t>(style.shape)];
@@ -147,7 +147,6 @@ LegendRow SignsOf(const std::vector<Curve>& curves, const std::vector<std::strin
   return row;
 }
 
-// Breaks items into rows no wider than `width`.
 std::vector<LegendRow> Broken(const LegendRow& items, double width) {
   std::vector<LegendRow> rows;
   double used = 0.0;
@@ -172,11 +171,10 @@ struct Legend {
   std::size_t letters = 0;  ///< listed curves that stand for several
 };
 
-/// Makes the legend of a figure with the curves `merged`. First come its own rows, or else the
-/// labels of the curves; with `names` these stand at the ends of the curves. Then follow the
-/// meaning of hollow marks, crosses and question marks, with `failures`, remarks on crosses without
-/// a curve. Last is a list of the curves that stand for several, by the letters at their ends. Rows
-/// are broken at the page width. In one column the list ends in "…" if the legend would exceed
+/// Makes the legend of a figure with the curves `merged`: its own rows, or else the labels of the
+/// curves (unless `names` puts them at the ends of the curves); the meaning of signs, with
+/// `failures`, remarks on crosses without a curve; the curves that stand for several, by the
+/// letters at their ends. In one column this list ends in "…" if the legend would exceed
 /// kLegendRows.
 Legend LegendOf(const Figure& figure, const std::vector<Curve>& merged, bool names, FigureSize size,
                 const std::vector<std::string>& failures) {
@@ -201,11 +199,11 @@ Legend LegendOf(const Figure& figure, const std::vector<Curve>& merged, bool nam
   }
   Append(Broken(named, width), &rows);
   Append(Broken(SignsOf(merged, failures), width), &rows);
-  std::size_t letters = several.size();
+  std::ptrdiff_t letters = std::ssize(several);
   const auto list = [&] {
-    std::string words = "coincide: ";
-    for (std::size_t i = 0; i < letters; ++i) words += (i == 0 ? "" : ";  ") + several[i];
-    if (letters < several.size()) words += letters == 0 ? "…" : ";  …";
+    std::vector<std::string> shown(several.begin(), several.begin() + letters);
+    if (letters < std::ssize(several)) shown.emplace_back("…");
+    const std::string words = "coincide: " + Joined(shown, ";  ");
     return Wrapped(words, static_cast<std::size_t>(width / kLetterWidth));
   };
   const auto has_room = [&] { return rows.size() + list().size() <= kLegendRows; };
@@ -213,7 +211,7 @@ Legend LegendOf(const Figure& figure, const std::vector<Curve>& merged, bool nam
   if (!several.empty()) {
     for (const std::string& line : list()) rows.push_back({TextItem(line)});
   }
-  return {std::move(rows), letters};
+  return {std::move(rows), static_cast<std::size_t>(letters)};
 }
 
 /// Draws rows below `top` [pt from the lower edge of the page].
@@ -269,7 +267,6 @@ std::vector<Point> Marks(const PlotArea& area, const std::vector<Point>& points,
   return marks;
 }
 
-// Draws y ~ x^exponent at the height of the points between its ends.
 std::string GuideElement(const Guide& guide, const std::vector<Point>& points) {
   double sum = 0.0;
   int count = 0;
@@ -333,15 +330,16 @@ std::string TicksCommand(char axis, const std::vector<Tick>& ticks, bool has_lab
 
 std::vector<Tick> NamedTicks(const std::vector<std::string>& names) {
   std::vector<Tick> ticks;
-  for (std::size_t i = 0; i < names.size(); ++i)
-    ticks.push_back({static_cast<double>(i + 1), names[i]});
+  for (const std::string& name : names) {
+    ticks.push_back({static_cast<double>(ticks.size() + 1), name});
+  }
   return ticks;
 }
 
 // Returns heights at least a line apart, each as near as possible to the wanted height.
 std::vector<double> Spread(std::vector<double> wanted, double low, double high) {
   std::vector<std::size_t> order(wanted.size());
-  for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
+  std::iota(order.begin(), order.end(), std::size_t{0});
   std::ranges::stable_sort(order, {}, [&](std::size_t i) { return wanted[i]; });
   constexpr double kDistance = 0.9 * kLineHeight;
   constexpr int kSweeps = 200;
@@ -362,65 +360,12 @@ struct PanelPlace {
   double left = 0.0, right = 0.0, bottom = 0.0, top = 0.0;
 };
 
-double HeightOfPanel(FigureSize size, std::size_t panels) {
-  const double alone = size == FigureSize::kOneColumn ? 135.0 : 200.0;
-  return panels == 1 ? alone : 0.7 * alone;
-}
-
-/// Returns the points that the axes can show.
-std::vector<Point> Drawable(const Axis& x, const Axis& y, const Curve& curve) {
-  std::vector<Point> points;
-  for (std::size_t i = 0; i < std::min(curve.x.size(), curve.y.size()); ++i) {
-    if (x.CanShow(curve.x[i]) && y.CanShow(curve.y[i])) points.emplace_back(curve.x[i], curve.y[i]);
-  }
-  return points;
-}
-
-/// Returns the points of a curve that are drawn.
-std::vector<Point> DrawnPoints(const PlotArea& area, const Curve& curve) {
-  const std::vector<Point> all = Drawable(area.x, area.y, curve);
-  return curve.line ? Decimated(area, all) : all;
-}
-
-/// Axes of a panel and its approximate size.
-PlotArea AreaOf(const Figure& panel, FigureSize size) {
-  AxisRange x(panel.log_x), y(panel.log_y);
-  const auto include = [&](const Point& point) {
-    x.Include(point.first);
-    y.Include(point.second);
-  };
-  for (const Curve& curve : panel.curves) {
-    std::ranges::for_each(
-        Drawable({.logarithmic = panel.log_x}, {.logarithmic = panel.log_y}, curve), include);
-    if (curve.ends_early && !curve.x.empty()) x.Include(curve.x.back());
-    std::ranges::for_each(curve.crosses, include);
-  }
-  const bool has_points = std::ranges::any_of(
-      panel.curves, [](const Curve& curve) { return curve.points || !curve.crosses.empty(); });
-  PlotArea area{.x = x.WithMargin(has_points ? 0.04 : 0.0),
-                .y = y.WithMargin(has_points ? 0.08 : 0.04),
-                .width = WidthOfPage(size) - 80.0,
-                .height = HeightOfPanel(size, 1)};
-  if (!panel.x_ticks.empty()) {
-    area.x = {.low = 0.5, .high = static_cast<double>(panel.x_ticks.size()) + 0.5};
-  }
-  return area;
-}
-
-/// Width [pt] of the labels of the vertical axis.
-double WidthOfLabels(const PlotArea& area) {
-  double widest = 0.0;
-  for (const Tick& tick : Ticks(area.y, 6)) widest = std::max(widest, WidthOf(tick.label));
-  return widest;
-}
-
 struct DrawnCurve {
   Curve curve;
   std::vector<Point> points = {};
   std::string text = "";  ///< at its end
 };
 
-/// Panel with the properties taken from its figure.
 struct Panel {
   Figure figure;
   PlotArea area;
@@ -450,11 +395,12 @@ std::vector<Panel> PanelsOf(const Figure& figure, FigureSize size) {
 
 /// True if curves are named at their ends instead of in the legend.
 bool NamesAtEnds(const Figure& figure, const Panel& panel) {
-  const auto named = std::ranges::count_if(panel.drawn, [](const DrawnCurve& one) {
+  const auto is_named = [](const DrawnCurve& one) {
     return !one.curve.label.empty() && one.curve.merges;
-  });
+  };
   return figure.legend.empty() &&
-         (figure.names_at_ends || named > static_cast<std::ptrdiff_t>(kLegendRows));
+         (figure.names_at_ends ||
+          std::ranges::count_if(panel.drawn, is_named) > static_cast<std::ptrdiff_t>(kLegendRows));
 }
 
 // Draws texts right of the panel, each with a thin line to the end of its curve.
@@ -552,71 +498,12 @@ std::string PanelScript(const Panel& panel, const GnuplotPage& page, const Panel
   return script + EndLabels(panel, page, place) + plot + '\n';
 }
 
-bool MayMerge(const Curve& curve) {
-  return curve.merges && !curve.label.empty() && !curve.ends_early;
-}
-
-/// Keeps the style of `one` where `other` has the same, else black, solid, unmarked.
-void KeepCommon(const CurveStyle& other, CurveStyle* one) {
-  const CurveStyle several;
-  if (one->color != other.color) one->color = several.color;
-  if (one->dash != other.dash) one->dash = several.dash;
-  if (one->shape != other.shape) one->shape = several.shape;
-  one->width = std::max(one->width, other.width);
-}
-
 }  // namespace
 
-std::vector<Curve> MergedCurves(const Figure& panel, FigureSize size) {
-  const PlotArea area = AreaOf(panel, size);
-  struct Group {
-    Curve curve;
-    std::vector<Point> points;
-    std::vector<std::string> labels;
-  };
-  std::vector<Group> groups;
-  std::vector<Curve> failures;  // they keep the colour of their curves
-  std::vector<std::string> all;
-  for (Curve curve : panel.curves) {
-    if (curve.merges && !curve.label.empty()) all.push_back(curve.label);
-    const std::vector<Point> points = DrawnPoints(area, curve);
-    const auto same = std::ranges::find_if(groups, [&](const Group& group) {
-      return MayMerge(curve) && MayMerge(group.curve) && curve.line == group.curve.line &&
-             curve.style.flagged == group.curve.style.flagged &&
-             Coincide(area, points, group.points, curve.line);
-    });
-    if (same == groups.end()) {
-      groups.push_back({curve, points, {curve.label}});
-      continue;
-    }
-    Curve& merged = same->curve;
-    AddOnce(same->labels, curve.label);
-    for (Curve* one : {&merged, &curve}) {
-      if (one->crosses.empty()) continue;
-      failures.push_back({.style = one->style, .merges = false});
-      failures.back().crosses.swap(one->crosses);
-    }
-    merged.hollow.insert(merged.hollow.end(), curve.hollow.begin(), curve.hollow.end());
-    KeepCommon(curve.style, &merged.style);
-    if (merged.remark.ends_with('?') && !curve.remark.ends_with('?')) {
-      merged.remark = curve.remark;  // the resolved one
-      merged.guide = curve.guide;
-    }
-  }
-  std::vector<Curve> drawn;
-  for (Group& group : groups) {
-    group.curve.several = group.labels.size() > 1;
-    if (group.curve.several) group.curve.label = LabelOfSeveral(group.labels, all);
-    drawn.push_back(std::move(group.curve));
-  }
-  drawn.insert(drawn.end(), failures.begin(), failures.end());
-  return drawn;
-}
-
-FigureScript GnuplotScript(const Figure& figure, FigureSize size) {
+Drawing GnuplotScript(const Figure& figure, FigureSize size) {
   std::vector<Panel> panels = PanelsOf(figure, size);
-  GnuplotPage page{.width = WidthOfPage(size)};
-  FigureScript script;
+  Drawing drawing{.page = {.width = WidthOfPage(size)}, .is_empty = true};
+  GnuplotPage& page = drawing.page;
   std::vector<Curve> all;
   std::vector<std::string> failures;  // of runs without a curve
   bool names = false;
@@ -624,7 +511,7 @@ FigureScript GnuplotScript(const Figure& figure, FigureSize size) {
     names = names || NamesAtEnds(figure, panel);
     for (const auto& [curve, points, text] : panel.drawn) {
       all.push_back(curve);
-      script.is_empty = script.is_empty && points.empty() && curve.crosses.empty();
+      drawing.is_empty = drawing.is_empty && points.empty() && curve.crosses.empty();
       const bool is_cross = points.empty() && curve.ends_early;
       if (is_cross && !curve.remark.empty()) AddOnce(failures, curve.remark);
     }
@@ -633,7 +520,7 @@ FigureScript GnuplotScript(const Figure& figure, FigureSize size) {
   double labels = 0.0, ends = 0.0;
   std::size_t next = 0;
   for (Panel& panel : panels) {
-    labels = std::max(labels, WidthOfLabels(panel.area));
+    for (const Tick& tick : Ticks(panel.area.y, 6)) labels = std::max(labels, WidthOf(tick.label));
     for (auto& [curve, points, text] : panel.drawn) {
       // its letter in the legend or its name, and its remark
       const bool has_letter = !figure.legend.empty() && curve.several && next++ < legend.letters;
@@ -654,9 +541,8 @@ FigureScript GnuplotScript(const Figure& figure, FigureSize size) {
   const double foot = 3.0 * line + kGap + line * static_cast<double>(legend.rows.size()) + kEdge;
   const double count = static_cast<double>(panels.size());
   page.height = std::round(head + count * (height + kGap) + foot);
-  script.height = page.height;
-  script.legend_rows = legend.rows.size();
-  std::string& commands = script.commands;
+  drawing.legend_rows = legend.rows.size();
+  std::string& commands = drawing.script;
   commands = "set encoding utf8\n";
   double y = page.height - kEdge - 0.5 * line;
   for (const std::string& words : title) {
@@ -677,14 +563,12 @@ FigureScript GnuplotScript(const Figure& figure, FigureSize size) {
     place.top = place.bottom - kGap;
   }
   if (panels.size() > 1) commands += "unset multiplot\n";
-  return script;
+  return drawing;
 }
 
 std::optional<std::string> WriteFigure(const std::filesystem::path& path, const Figure& figure,
                                        FigureSize size, const std::string& gnuplot) {
-  const FigureScript script = GnuplotScript(figure, size);
-  if (script.is_empty) return fmt::format("{}: no curve has a point to draw", path.string());
-  return DrawWithGnuplot(path, {WidthOfPage(size), script.height}, script.commands, gnuplot);
+  return DrawWithGnuplot(path, GnuplotScript(figure, size), gnuplot);
 }
 
 }  // namespace loopbench::harness

@@ -24,8 +24,7 @@ using Eigen::VectorXd;
 
 /// Number of tree speeds above which no loop motion is followed and nothing is analysed.
 constexpr int kMaxFollowed = 240;
-/// Maximum number of named points with paths, and of motions.
-constexpr std::size_t kMaxPoints = 50, kMaxMotions = 12;
+constexpr std::size_t kMaxPoints = 50, kMaxMotions = 12;  ///< named points with paths; motions
 
 /// Returns the poses of the bodies of a mechanism that was compiled from `description` unchanged.
 template <class Space>
@@ -46,25 +45,21 @@ Poses PosesOf(const MechanismDescription& description,
   return poses;
 }
 
-// Motions: each degree of freedom swings to and fro with all loops closed in every
-// frame. Prescribed motions run once.
+// Motions: each degree of freedom swings to and fro with all loops closed in every frame.
+// Prescribed motions run once.
 //
 // In the chosen basis of admissible speeds each motion moves one joint by one unit and stops the
-// leading joints of the other motions. Each motion is therefore named after a joint. A motion is
-// followed in small steps: a step along the projection of its last direction, then a position
-// projection onto the loops (excursion.h finds ranks in the same way). Links keep their lengths to
-// round-off. The swing ends early if the loops cannot close. If even the first step fails (speeds
-// of a singular configuration without a finite motion), bodies move along the speed itself by a
-// small angle, and the text states this.
+// leading joints of the others; it is named after its joint. It is followed in small steps along
+// the projection of its last direction, each with a position projection onto the loops. If even the
+// first step fails (speeds of a singular configuration without a finite motion), bodies move along
+// the speed itself by a small angle.
 
 /// Limit of the largest coordinate along a swing, in rad or lengths of the mechanism; and number of
 /// frames to either side.
 constexpr double kSwing = 0.7;
 constexpr int kFramesAside = 14, kFramesOfPass = 49;
-/// Amplitude of a motion without a finite path.
-constexpr double kSmall = 0.05;
+constexpr double kSmall = 0.05;  ///< amplitude of a motion without a finite path
 
-/// Moves a mechanism through its positions.
 template <class Space>
 class Follower {
  public:
@@ -99,8 +94,7 @@ class Follower {
     return Close();
   }
 
-  /// Moves along u, ignoring the loops.
-  void Shift(const VectorXd& u) { Place(Moved(u)); }
+  void Shift(const VectorXd& u) { Place(Moved(u, q_)); }
 
   /// Moves along the projection of `u` onto the constraints, which becomes the new direction.
   /// Returns true if the loops close at a different position.
@@ -140,7 +134,6 @@ class Follower {
     mechanism_.Normalise(moved);
     return moved;
   }
-  VectorX<double> Moved(const VectorXd& u) const { return Moved(u, q_); }
 
   /// Runs Newton's method to the nearest closed position.
   bool Close() {
@@ -167,7 +160,6 @@ class Follower {
   VectorXd units_;
 };
 
-/// Direction of an initially possible motion.
 struct MotionStart {
   int speed = 0;  ///< its leading speed: 1 here, 0 in the other directions
   VectorXd u;
@@ -230,12 +222,6 @@ std::vector<MotionStart> MotionStarts(const Follower<Space>& start, std::size_t 
   return all;
 }
 
-/// Returns the range of a swing in its leading speed.
-std::string SwingText(double from, double to, bool is_length, bool whole) {
-  return fmt::format("{:+.3g} to {:+.3g} {}{}; loops closed again in every frame", from, to,
-                     is_length ? "m" : "rad", whole ? "" : ", where it cannot be followed further");
-}
-
 template <class Space>
 PictureMotion Swing(const MechanismDescription& description, Follower<Space>* follower,
                     const MotionStart& beginning, int frames) {
@@ -267,7 +253,9 @@ PictureMotion Swing(const MechanismDescription& description, Follower<Space>* fo
   }
   follower->Place(start);
   const bool whole = std::ssize(sides[0]) == frames && std::ssize(sides[1]) == frames;
-  motion.text = SwingText(reach[0], reach[1], is_length, whole);
+  motion.text =
+      fmt::format("{:+.3g} to {:+.3g} {}{}; loops closed again in every frame", reach[0], reach[1],
+                  is_length ? "m" : "rad", whole ? "" : ", where it cannot be followed further");
   if (sides[0].empty() && sides[1].empty()) {
     const double size =
         beginning.u.cwiseQuotient(follower->units()).template lpNorm<Eigen::Infinity>();
@@ -468,8 +456,7 @@ void Measure(const MechanismDescription& description, Picture* picture) {
     }
   }
   picture->extent = box.isEmpty() ? 0.0 : box.sizes().maxCoeff();
-  // a mechanism of one point has no size: any value will do
-  if (!(picture->extent > 0.0)) picture->extent = 1.0;
+  if (!(picture->extent > 0.0)) picture->extent = 1.0;  // one point has no size
   double link = picture->extent;
   if (!links.empty()) {
     const auto middle = links.begin() + static_cast<std::ptrdiff_t>(links.size() / 2);
@@ -566,7 +553,7 @@ class Maker {
       loop.bodies = path.bodies;
       loop.joints = path.joints;
       for (const RedundantDirection& one : structure.redundant) {
-        if (one.joint != path.cut_joint) continue;
+        if (one.coupling >= 0 || one.joint != path.cut_joint) continue;
         loop.redundant.push_back(one.name + (one.released ? "" : " (at the start)"));
       }
       picture_->items[picture_->ItemOfJoint(path.cut_joint)].redundant = loop.redundant;

@@ -95,7 +95,6 @@ ReportPath PathOf(const Reference& reference, std::size_t most) {
   return path;
 }
 
-/// One problem and its rows.
 struct Work {
   const std::vector<Record>& records;
   const std::vector<std::string>& names;
@@ -190,52 +189,34 @@ void Fill(const Work& work, ReportProblem* problem, std::vector<std::string>* re
   }
 }
 
-/// Returns the problems of a table's rows, in their order.
 std::vector<ReportProblem> FindProblems(const ReportTable& table,
                                         const std::filesystem::path& store_file,
                                         std::vector<std::string>* remarks,
                                         std::vector<std::string>* changed) {
+  std::vector<std::size_t> rows(table.rows.size());
+  std::iota(rows.begin(), rows.end(), std::size_t{0});
+  const auto groups = GroupBy(rows, [&](std::size_t row) { return table.problems[row]; });
+  const std::size_t shown = std::min(groups.size(), kMaxProblems);
   std::vector<ReportProblem> found;
-  std::vector<std::vector<std::size_t>> members;
-  for (std::size_t row = 0; row < table.rows.size(); ++row) {
-    const std::string& name = table.problems[row];
-    auto at = static_cast<std::size_t>(std::ranges::find(found, name, &ReportProblem::name) -
-                                       found.begin());
-    if (at == found.size()) {
-      found.push_back({.name = name});
-      members.emplace_back();
-    }
-    members[at].push_back(row);
-  }
-  const std::size_t shown = std::min(found.size(), kMaxProblems);
-  for (std::size_t i = 0; i < found.size(); ++i) {
-    if (i >= shown) {
-      found[i].missing = fmt::format(
-          "Pictures are of the first {} problems of a store; for this one "
-          "make a store of its own (loopbench merge, --filter of run).",
-          kMaxProblems);
+  for (const auto& [name, members] : groups) {
+    ReportProblem& problem = found.emplace_back(ReportProblem{.name = name});
+    if (found.size() <= shown) {
+      Fill({table.rows, table.names, store_file, members, kMaxPlaces / shown}, &problem, remarks,
+           changed);
       continue;
     }
-    Fill({table.rows, table.names, store_file, members[i], kMaxPlaces / shown}, &found[i], remarks,
-         changed);
+    problem.missing = fmt::format(
+        "Pictures are of the first {} problems of a store; for this one "
+        "make a store of its own (loopbench merge, --filter of run).",
+        kMaxProblems);
   }
   return found;
 }
 
-/// Returns a command as typed in a shell, with quoting.
 std::string Typed(const std::vector<std::string>& words) {
   std::vector<const char*> pointers = {"loopbench"};
   for (const std::string& word : words) pointers.push_back(word.c_str());
   return CommandLine(static_cast<int>(pointers.size()), pointers.data());
-}
-
-bool IsBlank(const std::vector<Record>& rows, const TableColumn& column) {
-  return std::ranges::all_of(rows, [&](const Record& row) { return Cell(row, column).empty(); });
-}
-
-bool IsAlike(const std::vector<Record>& rows, const std::string& key) {
-  return std::ranges::all_of(
-      rows, [&](const Record& row) { return row.Text(key) == rows.front().Text(key); });
 }
 
 /// Returns the table's columns and all other record keys with a heading.
@@ -253,18 +234,15 @@ std::vector<TableColumn> AllColumns(const Table& table) {
 // Returns the keys of problems: equal in all rows of a problem, but not in all rows.
 std::vector<std::string> KeysOfProblems(const std::vector<Record>& rows,
                                         const std::vector<std::string>& telling) {
+  const auto problems = GroupBy(
+      rows, [](const Record& row) { return row.Text("problem_id") + " " + row.Text("horizon"); });
   std::vector<std::string> keys;
-  std::map<std::string, const Record*> first;
-  for (const Record& row : rows) {
-    first.emplace(row.Text("problem_id") + " " + row.Text("horizon"), &row);
-  }
   for (const std::string& key : telling) {
     if (key == "mechanism" || key == "horizon" || key == "experiment") continue;
-    const bool is_problems = first.size() > 1 && std::ranges::all_of(rows, [&](const Record& row) {
-                               const Record& other =
-                                   *first.at(row.Text("problem_id") + " " + row.Text("horizon"));
-                               return row.Text(key) == other.Text(key);
-                             });
+    const bool is_problems =
+        problems.size() > 1 && std::ranges::all_of(problems, [&](const auto& problem) {
+          return IsAlike(problem.second, key);
+        });
     if (is_problems) keys.push_back(key);
   }
   return keys;
@@ -304,7 +282,8 @@ std::vector<ReportTable> MakeTables(const std::vector<Record>& records, const st
     if (full.rows.empty()) continue;
     ReportTable table{.kind = kind, .title = title};
     for (TableColumn& column : AllColumns(full)) {
-      if (IsBlank(full.rows, column)) continue;
+      const auto is_blank = [&](const Record& row) { return Cell(row, column).empty(); };
+      if (std::ranges::all_of(full.rows, is_blank)) continue;
       if (full.rows.size() > 1 && IsAlike(full.rows, column.key) && column.key != "outcome") {
         table.alike.push_back(column.header + ": " + Cell(full.rows.front(), column));
       } else {
@@ -329,19 +308,18 @@ std::vector<ReportFinding> FindingsOf(const ReportTable& table,
   }
   std::vector<ReportFinding> findings;
   for (const auto& [outcome, rows] : endings) {
-    std::string text =
-        fmt::format("{} of {} runs ended as {}: ", rows.size(), table.rows.size(), outcome);
-    for (std::size_t i = 0; i < std::min(rows.size(), kRowsNamed); ++i) {
-      const Record& row = table.rows[rows[i]];
-      text += fmt::format("{}{}: {}", i == 0 ? "" : "; ", table.problems[rows[i]],
-                          table.names[rows[i]]);
+    const std::vector<std::string> names = Mapped<std::string>(rows, [&](std::size_t i) {
+      const Record& row = table.rows[i];
+      std::string text = fmt::format("{}: {}", table.problems[i], table.names[i]);
       if (!row.Text("t_reached").empty()) {
         text += fmt::format(" at {:.4g} s", row.Number("t_reached"));
       }
-      if (!row.Text("message").empty()) text += fmt::format(" ({})", row.Text("message"));
-    }
-    if (rows.size() > kRowsNamed) text += fmt::format("; and {} more", rows.size() - kRowsNamed);
-    findings.push_back({true, text, "outcome=" + outcome});
+      return text + (row.Text("message").empty() ? "" : " (" + row.Text("message") + ")");
+    });
+    findings.push_back({true,
+                        fmt::format("{} of {} runs ended as {}: {}", rows.size(), table.rows.size(),
+                                    outcome, FirstOf(names, kRowsNamed, "; ", "; and {} more")),
+                        "outcome=" + outcome});
   }
   for (const std::string& note : warnings) {
     const std::string code = note.substr(0, note.find(':'));
@@ -381,11 +359,9 @@ std::vector<std::string> OriginsOf(const std::vector<Record>& records) {
     ++counts[fmt::format("experiment {}, commit {}, {}, {} {}", record.Text("experiment"),
                          origin.commit, origin.machine, origin.compiler, origin.flags)];
   }
-  std::vector<std::string> lines;
-  for (const auto& [line, count] : counts) {
-    lines.push_back(WithCount(count, "record") + ": " + line);
-  }
-  return lines;
+  return Mapped<std::string>(counts, [](const auto& origin) {
+    return WithCount(origin.second, "record") + ": " + origin.first;
+  });
 }
 
 struct Quantity {
@@ -446,8 +422,8 @@ ReportData MakeReport(const std::vector<Record>& records, const ReportOptions& o
   const ReportTable& runs = data.tables.front();
   data.runs = runs.rows.size();
   for (const Record& row : runs.rows) {
-    data.failed += HasFailed(row) ? 1 : 0;
-    data.flagged += IsFlagged(row, "outcome") ? 1 : 0;
+    data.failed += HasFailed(row);
+    data.flagged += IsFlagged(row, "outcome");
   }
   data.warning_notes = WarningNotes(runs.rows, records);
   data.findings = FindingsOf(runs, data.warning_notes);

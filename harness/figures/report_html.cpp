@@ -257,7 +257,6 @@ std::string Command(const std::string& command) {
   return "<p class=\"command\"><code>" + EscapeXml(command) + "</code></p>\n";
 }
 
-/// Returns numbers of runs and outcomes, as a sentence and a bar.
 std::string SummaryOf(const ReportData& data) {
   if (data.runs == 0) return "<p>The store has no accuracy runs.</p>\n";
   const std::size_t good = data.runs - data.failed - data.flagged;

@@ -2,7 +2,6 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <numeric>
 #include <utility>
 #include <vector>
 
@@ -14,7 +13,6 @@ namespace {
 using Eigen::Vector3d;
 using Points = std::vector<Vector3d>;
 
-/// Returns the indices of distinct points, in order.
 std::vector<int> Distinct(const Points& points, double tolerance) {
   std::vector<int> kept;
   for (int i = 0; i < static_cast<int>(points.size()); ++i) {
@@ -25,7 +23,6 @@ std::vector<int> Distinct(const Points& points, double tolerance) {
   return kept;
 }
 
-/// Returns the point of `among` with the largest `measure`.
 template <class Measure>
 int Farthest(const std::vector<int>& among, Measure measure) {
   return *std::ranges::max_element(among, {}, measure);
@@ -139,7 +136,6 @@ struct End {
   PicturePlace Place() const { return {.body = body, .at = X.p}; }
 };
 
-/// Adds shapes of one item to a picture.
 class Pen {
  public:
   Pen(Picture* picture, std::size_t item) : picture_(picture), item_(static_cast<int>(item)) {}
@@ -341,7 +337,6 @@ class JointSymbol {
     pen_.Add(ShapeKind::kBar, style, pen_.On(from_, ends), radius);
   }
 
-  /// Returns M in F at the start.
   Frame Relative() const {
     const Frame P = picture_.start[from_.body], Q = picture_.start[to_.body];
     return (P * from_.X).Inverse() * (Q * to_.X);

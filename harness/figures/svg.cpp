@@ -57,8 +57,6 @@ Camera FitTo(const Picture& picture, const std::vector<const Poses*>& poses,
   return camera;
 }
 
-// Shapes as SVG elements.
-
 using ProjectedPoints = std::vector<ProjectedPoint>;
 
 /// Colours of a shape, and the line width [px].
@@ -199,8 +197,6 @@ std::string Centre(const ProjectedPoint& c, double r, const Ink& ink) {
              x, y, top, radius, right, bottom, left);
 }
 
-// The document.
-
 /// Page of 160 mm at 96 px per inch; a font of 8 points.
 constexpr double kWidth = 605.0, kMargin = 26.0, kFont = 10.7, kFooter = 52.0, kLine = 14.0;
 constexpr const char* kFamily = "DejaVu Sans, Verdana, Arial, Helvetica, sans-serif";
@@ -279,7 +275,6 @@ class Document {
     }
   }
 
-  /// Draws all shapes at the start, the farthest first.
   void DrawShapes() {
     std::vector<std::pair<double, const PictureShape*>> order;
     for (const PictureShape& shape : picture_.shapes) {
@@ -315,31 +310,28 @@ class Document {
     Ink ink = InkOf(item, shape.style);
     // in space, parts behind a plate show through
     if (shape.style == ShapeStyle::kBody && !picture_.planar) ink.opacity = "0.8";
-    switch (shape.kind) {
-      case ShapeKind::kLine:
-        body_ += Path(PathOf(spots, false), ink, false);
-        break;
+    body_ += Drawn(shape.kind, spots, radius, aside, ink);
+  }
+
+  std::string Drawn(ShapeKind kind, const ProjectedPoints& spots, double radius, double aside,
+                    const Ink& ink) const {
+    switch (kind) {
       case ShapeKind::kArea:
-        body_ += Thick(spots, true, radius, ink);
-        break;
+        return Thick(spots, true, radius, ink);
       case ShapeKind::kBar:
-        body_ += Thick(spots, false, radius, ink);
-        break;
+        return Thick(spots, false, radius, ink);
       case ShapeKind::kDisc:
-        body_ += Disc(spots.front(), radius, ink);
-        break;
+        return Disc(spots.front(), radius, ink);
       case ShapeKind::kCentre:
-        body_ += Centre(spots.front(), radius, ink);
-        break;
+        return Centre(spots.front(), radius, ink);
       case ShapeKind::kSpring:
-        body_ += Spring(spots[0], spots[1], radius, aside, ink);
-        break;
+        return Spring(spots[0], spots[1], radius, aside, ink);
       case ShapeKind::kDamper:
-        body_ += Damper(spots[0], spots[1], radius, aside, ink);
-        break;
+        return Damper(spots[0], spots[1], radius, aside, ink);
       case ShapeKind::kArrow:
-        body_ += Arrow(spots, 1.3 * picture_.symbol * camera_.scale, ink);
-        break;
+        return Arrow(spots, 1.3 * picture_.symbol * camera_.scale, ink);
+      default:
+        return Path(PathOf(spots, false), ink, false);
     }
   }
 
@@ -450,7 +442,6 @@ class Document {
     }
   }
 
-  /// Draws scale, axes and gravity.
   void DrawFooter(double top) {
     const double length = RoundLength(0.25 * kWidth / camera_.scale), px = length * camera_.scale;
     const double y = top + 0.5 * kFooter;
@@ -504,20 +495,13 @@ class Document {
     }
     if (ghost)
       lines.push_back("grey, dashed: as in the file, before the assembly closed the loops");
+    std::vector<PictureItem> gone;
+    std::ranges::copy_if(picture_.items, std::back_inserter(gone),
+                         [](const PictureItem& item) { return !item.gone.empty(); });
     // parts with equal text share a line
-    std::vector<std::pair<std::string, std::string>> gone;
-    for (const PictureItem& item : picture_.items) {
-      if (item.gone.empty()) continue;
-      const auto same =
-          std::ranges::find(gone, item.gone, &std::pair<std::string, std::string>::first);
-      if (same == gone.end()) {
-        gone.emplace_back(item.gone, item.name);
-      } else {
-        same->second += ", " + item.name;
-      }
+    for (const auto& [what, items] : GroupBy(gone, &PictureItem::gone)) {
+      lines.push_back("dashed outline, " + what + ": " + Joined(items, ", ", &PictureItem::name));
     }
-    for (const auto& [what, names] : gone)
-      lines.push_back("dashed outline, " + what + ": " + names);
     if (lines.size() > kMaxLines) {
       const std::size_t more = lines.size() - kMaxLines + 1;
       lines.resize(kMaxLines - 1);

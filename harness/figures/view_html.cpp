@@ -176,12 +176,13 @@ class Writer {
   std::vector<Table> Write() const { return {Bodies(), Joints(), Forces(), Loops(), Motions()}; }
 
  private:
-  /// Adds columns x, y and, in space, z.
-  void AddPlace(const std::string& prefix, const std::string& what, Table* table) const {
-    for (const char axis : {'x', 'y', 'z'}) {
-      if (axis == 'z' && picture_.planar) continue;
-      table->columns.push_back({prefix + axis, what + axis + " [m]"});
+  /// Returns columns x, y and, in space, z, for Columns().
+  std::string PlaceColumns(const std::string& prefix = "") const {
+    std::string columns;
+    for (const char axis : std::string_view(picture_.planar ? "xy" : "xyz")) {
+      columns += fmt::format("{0}{1}={0}{2}{1} [m], ", prefix, axis, prefix.empty() ? "" : " ");
     }
+    return columns;
   }
   void SetPlace(const std::string& prefix, const Vector3d& p, Record* row) const {
     for (int i = 0; i < (picture_.planar ? 2 : 3); ++i) {
@@ -191,11 +192,9 @@ class Writer {
 
   Table Bodies() const {
     Table table{.title = picture_.assembled ? "Bodies, as assembled" : "Bodies, as in the file",
-                .columns = {{"name", "body"}}};
-    AddPlace("", "", &table);
-    table.columns.push_back({"turn", picture_.planar ? "angle [rad]" : "turn [rad]"});
-    AddPlace("com", "com ", &table);
-    table.columns.push_back({"gone", "in a run"});
+                .columns = Columns("name=body, " + PlaceColumns() +
+                                   (picture_.planar ? "turn=angle [rad], " : "turn=turn [rad], ") +
+                                   PlaceColumns("com") + "gone=in a run")};
     for (std::size_t b = 1; b < picture_.bodies; ++b) {
       const Frame& X = picture_.start[b];
       Record& row = AddRow({picture_.items[b].name}, &table);
@@ -207,7 +206,6 @@ class Writer {
     return table;
   }
 
-  /// Returns the angle, or the rotation vector.
   std::string TurnText(const Eigen::Matrix3d& R) const {
     if (picture_.planar) return Number(std::atan2(R(1, 0), R(0, 0)), 1e-12);
     const Eigen::AngleAxisd turn(R);
@@ -217,10 +215,9 @@ class Writer {
   }
 
   Table Joints() const {
-    Table table{.title = "Joints", .columns = {{"name", "joint"}, {"what", "what"}}};
-    AddPlace("", "", &table);
-    table.columns.push_back({"redundant", "redundant"});
-    table.columns.push_back({"gone", "in a run"});
+    Table table{
+        .title = "Joints",
+        .columns = Columns("name=joint, what, " + PlaceColumns() + "redundant, gone=in a run")};
     for (std::size_t j = 0; j < picture_.joints; ++j) {
       const PictureItem& item = picture_.items[picture_.ItemOfJoint(static_cast<int>(j))];
       Record& row = AddRow({item.name, item.detail}, &table);
@@ -232,9 +229,8 @@ class Writer {
   }
 
   Table Forces() const {
-    Table table{.title = "Forces", .columns = {{"name", "force"}, {"what", "what"}}};
-    AddPlace("", "", &table);
-    AddPlace("to", "to ", &table);
+    Table table{.title = "Forces",
+                .columns = Columns("name=force, what, " + PlaceColumns() + PlaceColumns("to"))};
     for (std::size_t i = picture_.bodies + picture_.joints; i < picture_.items.size(); ++i) {
       const PictureItem& item = picture_.items[i];
       Record& row = AddRow({item.name, item.detail}, &table);
@@ -250,12 +246,9 @@ class Writer {
   }
 
   Table Loops() const {
-    Table table{.title = "Loops"};
-    table.columns = {{"name", "cut joint"},
-                     {"gap", "open in the file [m]"},
-                     {"turn", "[rad]"},
-                     {"left", "assembled [m]"},
-                     {"bodies", "bodies"}};
+    Table table{.title = "Loops",
+                .columns = Columns("name=cut joint, gap=open in the file [m], turn=[rad], "
+                                   "left=assembled [m], bodies")};
     for (const PictureLoop& loop : picture_.loops) {
       AddRow({picture_.items[picture_.ItemOfJoint(loop.cut_joint)].name, Number(loop.gap, small_),
               Number(loop.turn, 1e-12), Number(loop.left, small_),
@@ -266,7 +259,7 @@ class Writer {
   }
 
   Table Motions() const {
-    Table table{.title = "Motions", .columns = {{"name", "motion"}, {"what", "how far"}}};
+    Table table{.title = "Motions", .columns = Columns("name=motion, what=how far")};
     for (const PictureMotion& motion : picture_.motions) AddRow({motion.name, motion.text}, &table);
     return table;
   }

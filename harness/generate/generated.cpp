@@ -1,18 +1,13 @@
 #include "harness/generate/generated.h"
 
 #include <dlfcn.h>
-#include <fmt/format.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include <algorithm>
-#include <array>
 #include <cerrno>
-#include <csignal>
 #include <cstdlib>
 #include <fstream>
 #include <mutex>
-#include <optional>
 #include <sstream>
 
 #include "harness/base/text.h"
@@ -281,8 +276,7 @@ class Lane {
   Lane(const Lane&) = delete;
   Lane& operator=(const Lane&) = delete;
 
-  /// Joins the runs with this mechanism whose first recordings have this key, unless it has joined
-  /// others.
+  /// Joins the runs with this mechanism whose first recordings have this key, if it is alone.
   void Join(const void* mechanism, const std::string& first_key) {
     if (shared_ != nullptr) return;
     if (mechanism != nullptr) shared_ = calls_.shared[{mechanism, first_key}];

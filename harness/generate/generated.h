@@ -1,5 +1,4 @@
-// A system's right-hand side, and the steps of level projection, as generated code: recorded,
-// compiled, loaded, called.
+// A system's right-hand side and steps of level projection as generated code.
 //
 // A recording is valid if all its comparisons have their recorded outcomes (graph.h). Otherwise the
 // library evaluates; after several such evaluations the branch of the current state is recorded
@@ -11,8 +10,7 @@
 // first branches share their branches of all modes.
 //
 // Compiled code receives the recorded constants. Two recordings share it if they differ in the
-// numbers of constants alone. A constant of 0 or 1 simplifies the graph, which then has its own
-// code.
+// numbers of constants alone. A constant of 0 or 1 simplifies the graph.
 #pragma once
 
 #include <filesystem>
@@ -95,8 +93,7 @@ class GeneratedDerivative final : public CompiledDerivative {
   std::int64_t misses() const override { return misses_; }
   double seconds() const override { return seconds_; }
 
-  /// Branches of a function that are compiled for the current mode: dy/dt, or a step of level
-  /// projection.
+  /// Branches of a function for the current mode: dy/dt, or a step of level projection.
   int branches(Quantity quantity = Quantity::kDerivative) const {
     const auto found = mode_->functions.find(quantity);
     return found == mode_->functions.end() ? 0 : static_cast<int>(found->second.branches.size());
@@ -112,8 +109,7 @@ class GeneratedDerivative final : public CompiledDerivative {
   void AddBranch(Quantity quantity, Function& function);
   /// Puts time and state where compiled functions read them.
   void SetInputs(double t, std::span<const double> y);
-  /// Returns false if no branch of the function is valid at x_. After several such calls that of x_
-  /// is added.
+  /// Returns false if no branch is valid at x_. After several such calls that of x_ is added.
   bool Compute(Quantity quantity, std::span<double> results);
   bool Call(const Code& code, std::span<double> results);
   std::shared_ptr<const Code> Compile(RecordedFunction recorded, bool in_lanes);

@@ -1,10 +1,6 @@
 #include "harness/generate/record.h"
 
-#include <fmt/format.h>
-
-#include <algorithm>
 #include <cmath>
-#include <optional>
 #include <set>
 
 #include "harness/base/text.h"

@@ -1,5 +1,4 @@
-// Records the right-hand side of a formulation: the library's own text, evaluated once with a
-// scalar that notes its operations (recorded.h).
+// Records the right-hand side of a formulation, evaluated with a recording scalar (recorded.h).
 #pragma once
 
 #include <stdexcept>
@@ -27,8 +26,7 @@ enum class Quantity {
   kPoses,
   kViolation,   ///< of each constraint row: of positions [m, rad], then of speeds [m/s, rad/s]
   kCorrection,  ///< the state after one Newton step toward the constraints, positions then speeds
-  // Steps of level projection (mechanism/formulation/compiled_derivative.h), where constraints are
-  // regular.
+  // Steps of level projection (compiled_derivative.h), where constraints are regular.
   kMismatch,
   kPositionStep,
   kSpeedStep,
@@ -43,15 +41,13 @@ struct RecordingSubject {
   bool with_work = false;      ///< System::IntegrateWork()
   bool keeps_numbers = false;  ///< in the graph (graph.h)
   Quantity quantity = Quantity::kDerivative;
-  /// Longest recording, in nodes. Equations of shipped mechanisms have some ten thousand,
-  /// factorisations that iterate more.
+  /// Longest recording, in nodes. Equations of shipped mechanisms have some ten thousand.
   std::size_t most_nodes = 100'000;
   /// Runs side by side call code together if its recording has at least this many live nodes. A
   /// change of runs takes some 150 ns, more than lanes save in shorter code
   /// (results/methods/README.md).
   std::int64_t least_in_lanes = 2000;
-  /// Runs with equal ones have equal mechanisms, except for their starts, and share recordings;
-  /// null: no other run has an equal mechanism.
+  /// Equal for runs of one mechanism, which share recordings; null: no other run has it.
   const void* mechanism = nullptr;
 };
 
@@ -84,8 +80,7 @@ struct RecordedFunction {
   std::string key;                   ///< functions of a mechanism with equal keys are equal
 };
 
-/// Records the subject's quantity at time t and `state`: positions, then speeds, and works where
-/// these are wanted. Throws NotCovered.
+/// Records the quantity at t and `state`: positions, speeds, works if wanted. Throws NotCovered.
 RecordedFunction RecordFunction(const RecordingSubject& subject, const RecordingStart& start,
                                 double t, const std::vector<double>& state);
 

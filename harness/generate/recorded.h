@@ -18,8 +18,7 @@ namespace loopbench::generate {
 /// Result of a cast of a recorded number to another type.
 enum class CastsAs { kNumber, kInfinity, kMinusInfinity };
 
-/// While it lives, numbers of this thread are recorded in `graph`. Beyond `most_nodes` an operation
-/// throws NotCovered (record.h).
+/// Records numbers of this thread in `graph`. Beyond `most_nodes` an operation throws NotCovered.
 class Recording {
  public:
   Recording(Graph& graph, CastsAs casts, std::size_t most_nodes = 100'000);

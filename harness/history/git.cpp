@@ -1,9 +1,5 @@
-#include <fmt/format.h>
-
 #include <fstream>
 #include <sstream>
-#include <stdexcept>
-#include <utility>
 
 #include "harness/base/text.h"
 #include "harness/history/history.h"
@@ -90,9 +86,8 @@ class HistoryBranch {
     return message;
   }
 
-  /// Commits all changes to the branch, and creates it if necessary; does nothing without changes.
-  /// Returns false if another process has changed the branch: repeat the changes in a new
-  /// HistoryBranch.
+  /// Commits all changes to the branch, which may be new; does nothing without changes. Returns
+  /// false if another process has changed it: repeat the changes in a new HistoryBranch.
   bool Commit(const std::string& message) {
     const std::string commit = NewCommit(message);
     if (commit == at_) return true;

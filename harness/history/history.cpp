@@ -1,13 +1,9 @@
 #include "harness/history/history.h"
 
-#include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include <algorithm>
-#include <chrono>
 #include <cstdlib>
 #include <set>
-#include <utility>
 
 #include "harness/base/record.h"
 #include "harness/base/store.h"
@@ -62,8 +58,7 @@ bool IsDate(const std::string& text) {
 
 std::filesystem::path FileOf(const std::filesystem::path& folder) { return folder / kFile; }
 
-/// Returns a results file by its name in a line. Rejects untrusted names outside of the history,
-/// after following links.
+/// Returns a results file by its name in a line. Rejects names outside of the history.
 std::filesystem::path ResultsIn(const std::filesystem::path& folder, const std::string& name) {
   const std::filesystem::path path = name, whole = std::filesystem::weakly_canonical(folder);
   const std::filesystem::path end = std::filesystem::weakly_canonical(folder / path);

@@ -79,8 +79,7 @@ inline constexpr double kFalseAlarms = 0.01;
 ///     values beyond half of the step, with the share beyond 3 sigma in the series.
 std::vector<LevelChange> FindChanges(std::span<const double> x, const Resolution& resolution);
 
-// Location of a history: a folder, or a branch of its own in the git repository of the current
-// directory.
+// Location of a history: a folder, or a branch of its own in the git repository here.
 
 /// Checked-out commit and its date (ISO 8601, UTC); both "" outside of a repository.
 struct CheckedOut {
@@ -162,8 +161,7 @@ struct Mark {
   std::string mark, note = {};
   bool keeps_accepted = false;  ///< do not overwrite an existing `accepted` mark
 };
-/// Marks a commit on all machines; returns its present mark with its full name. Throws ConfigError
-/// if the prefix matches no commit or several.
+/// Marks a commit on all machines; returns it in full. Throws ConfigError unless one matches.
 Mark MarkInHistory(const std::filesystem::path& folder, Mark mark,
                    std::vector<std::string>* warnings = nullptr);
 
@@ -173,8 +171,7 @@ Mark MarkInHistory(const std::filesystem::path& folder, Mark mark,
 /// measurements of that commit on `machine`.
 std::optional<HistoryEntry> LastGood(const History& history, const std::string& machine);
 
-/// Returns the baseline for times, which depend on the machine: entries of this machine come first,
-/// marked or not.
+/// Returns the baseline for times: entries of this machine come first, marked or not.
 std::optional<HistoryEntry> LastGoodOfMachine(const History& history, const std::string& machine);
 
 // Series of measurements over commits, and their steps.
@@ -230,8 +227,7 @@ struct HistoryFindings {
 /// read.
 HistoryFindings FindingsOf(const History& history);
 
-/// Returns a row for each step, newest first; in one commit changed outcomes come first. "ratio" is
-/// empty if the level was 0 or a text.
+/// Returns a row for each step, newest first, outcomes before levels. "ratio" may be empty.
 Table StepTable(const History& history, const HistoryFindings& found);
 
 /// Returns the number of omitted times as a sentence; nothing if there are none.

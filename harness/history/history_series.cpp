@@ -1,15 +1,10 @@
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <cmath>
-#include <functional>
 #include <limits>
 #include <map>
 #include <set>
-#include <span>
 #include <tuple>
-#include <utility>
-#include <vector>
 
 #include "harness/base/record.h"
 #include "harness/history/history.h"
@@ -226,6 +221,8 @@ void MarkUnsteady(const std::vector<std::string>& compilers, std::vector<History
   }
 }
 
+constexpr std::size_t kFewCases = 3;  ///< with a common variation
+
 /// Sets the variation common to `cases`: the median over cases of their values without their own
 /// changes, again without changes. A change of some cases thus never shows in the others.
 void SetCommon(const std::vector<HistorySeries*>& cases) {
@@ -241,6 +238,8 @@ void SetCommon(const std::vector<HistorySeries*>& cases) {
     const std::vector<double> variation = VariationOf(std::move(logarithms));
     for (std::size_t i = 0; i < entries.size(); ++i) at_entry[entries[i]].push_back(variation[i]);
   }
+  // a median of three is free of the changes of one
+  std::erase_if(at_entry, [](const auto& at) { return at.second.size() < kFewCases; });
   std::vector<double> medians;
   for (const auto& [entry, values] : at_entry) medians.push_back(Median(values));
   const std::vector<double> variation = VariationOf(std::move(medians));
@@ -265,17 +264,16 @@ std::vector<HistorySeries> PoolTimes(std::vector<HistorySeries>* all) {
   }
   std::vector<HistorySeries> pooled;
   for (const auto& [key, cases] : times) {
-    if (cases.size() < kMany) continue;
+    if (cases.size() < kFewCases) continue;
     HistorySeries pool = Pooled({cases.begin(), cases.end()});
     if (pool.values.empty()) continue;
     SetCommon(cases);
-    pooled.push_back(std::move(pool));
+    if (cases.size() >= kMany) pooled.push_back(std::move(pool));
   }
   return pooled;
 }
 
-/// Returns the median over the cases of a pool of their own changes between entries, as
-/// logarithms of median ratios.
+/// Returns the median over a pool's cases of their own changes, as logarithms of median ratios.
 double ChangeOfCases(const HistorySeries& pool, const std::vector<HistorySeries>& all,
                      std::size_t begin, std::size_t at, std::size_t end) {
   std::vector<double> changes;

@@ -11,8 +11,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
-#include <memory>
 #include <type_traits>
 
 #include "harness/integrator/stepper.h"
@@ -71,8 +69,7 @@ struct ControllerPtr {};  // ARKODE 6 keeps the controller inside its memory
 
 std::span<double> Span(N_Vector v) { return {NV_DATA_S(v), static_cast<size_t>(NV_LENGTH_S(v))}; }
 
-// Debian's library goes through memory once per term; these give the same bits (same order of
-// additions) in one pass.
+// Debian's library takes a pass per term; these give the same bits (order of additions) in one.
 void Scale(sunrealtype c, N_Vector x, N_Vector z) {
   const std::span<double> from = Span(x), to = Span(z);
   if (c == 1) {
@@ -143,8 +140,7 @@ void SetTable(void* memory, const ButcherTable& table) {
 }
 
 // Context, messages and step-size controller of the supported versions of SUNDIALS. Error texts of
-// the context go to `*message` after CaptureMessages(). The controller must live as long as
-// `memory`.
+// the context go to `*message` after CaptureMessages(). The controller outlives `memory`.
 #if SUNDIALS_VERSION_MAJOR >= 7
 
 void KeepMessage(int, const char*, const char*, const char* text, SUNErrCode, void* message,
@@ -244,8 +240,7 @@ std::int64_t NewtonIterations(void* memory) {
 /// correction is more than half of the one before.
 class Newton {
  public:
-  /// Makes ARKStep's `memory` solve its stages with Jacobians of `ode`, its user data. Must outlive
-  /// `memory`.
+  /// Makes ARKStep's `memory` solve stages with Jacobians of `ode`, its user data. Outlives it.
   Newton(void* memory, N_Vector y, GuardedOde& ode, SUNContext context)
       : memory_(memory),
         ode_(ode),
@@ -260,8 +255,7 @@ class Newton {
     solver_->ops->solve = Solve;
     LOOPBENCH_SET_IMPLICIT(SetLinearSolver, memory, solver_.get(), matrix_.get());
     LOOPBENCH_SET_IMPLICIT(SetLinSysFn, memory, LinearSystem);
-    // A solution scaled for a gamma that has changed would be wrong in the quadratures, whose
-    // convergence nothing tests.
+    // A solution scaled for another gamma would be wrong in the quadratures, which nothing tests.
     LOOPBENCH_SET_IMPLICIT(SetLinearSolutionScaling, memory, SUNFALSE);
     // f of a stage is (z - a) / gamma: evaluated at z it would multiply Newton's residual by J.
     LOOPBENCH_SET_IMPLICIT(SetDeduceImplicitRhs, memory, SUNTRUE);
@@ -275,8 +269,7 @@ class Newton {
       // a correction that grows ends the iteration elsewhere; here it renews the Jacobian
       LOOPBENCH_SET_IMPLICIT(SetNonlinRDiv, memory, 1e9);
     }
-    // A stage starts from the line through the last two states: fewer and less distant iterations
-    // than from the last state alone.
+    // A stage starts from the line through the last two states, which saves iterations.
     LOOPBENCH_SET_IMPLICIT(SetPredictorMethod, memory, 1);
   }
 
@@ -352,8 +345,7 @@ int Weights(N_Vector y, N_Vector weight, void* data) {
 }
 int NoChange(sunrealtype, N_Vector, void*) { return 0; }
 
-// Returns the times at which steps must end, in order, t_end last. Times too close for ARKODE to
-// separate are merged.
+// Returns the times at which steps must end, t_end last; those too close for ARKODE as one.
 std::vector<double> StepEnds(const std::vector<double>& stop_times, double t0, double t_end) {
   const double close =
       100 * std::numeric_limits<double>::epsilon() * std::max(std::abs(t0), std::abs(t_end));
@@ -370,8 +362,7 @@ std::vector<double> StepEnds(const std::vector<double>& stop_times, double t0, d
 
 using namespace arkode;
 
-// Members are destroyed in reverse order: the context must outlive the others, and the memory must
-// not.
+// Members are destroyed in reverse order: the context outlives the others, the memory does not.
 struct Stepper::Arkode {
   Arkode(GuardedOde& guarded, double t_start, double t_end, const std::vector<double>& y0)
       : ode_(guarded),

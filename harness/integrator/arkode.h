@@ -51,8 +51,7 @@ struct DenseObserver {
   /// the interpolation error. At the end of a step both are the state that the observer left.
   std::function<void(std::size_t k, std::span<const double> y, std::span<const double> lower)>
       observe;
-  /// Derivative function for dense output, if its evaluations are counted separately; null uses the
-  /// problem's own.
+  /// Derivative for dense output, if counted separately; null uses the problem's own.
   DenseDerivative derivative = nullptr;
 };
 

@@ -39,17 +39,15 @@ struct Hypothesis {
 /// Compares the laws t^(1/2), t, t^(3/2), t^2 and e^(k t) on running maxima read at times spaced
 /// evenly in log t, one series per member of the ensemble, all over the same window.
 ///
-/// Fit: least squares of log(drift), so that errors are relative and every decade counts the same.
-/// Power laws have one free number (the factor), e^(k t) has two. The score of a hypothesis in one
-/// member is ln(mean square residual) + m ln(n) / n with m free numbers and n independent readings:
-/// the Bayesian information criterion per reading. The winner has the least mean score over the
-/// members. It is "none" if a power law wins whose exponent is further than 0.15 from the mean of
-/// the fitted ones. It is also "none" if e^(k t) wins, but does not grow by a factor e or does not
-/// beat a power law of free exponent.
+/// Fit: least squares of log(drift). The score of a hypothesis in one member is ln(mean square
+/// residual) + m ln(n) / n with m free numbers (one for powers, two for e^(k t)) and n independent
+/// readings: the Bayesian information criterion per reading. The winner has the least mean score
+/// over the members. It is "none" if a power law wins whose exponent is further than 0.15 from the
+/// mean of the fitted ones. It is also "none" if e^(k t) wins, but does not grow by a factor e or
+/// does not beat a power law of free exponent.
 ///
-/// Score differences between two hypotheses are formed member by member. Their standard error over
-/// the members decides whether a rival is refuted: members are independent, readings of one run are
-/// not (Vuong's model comparison, paired by run).
+/// The standard error of score differences over the members decides whether a rival is refuted:
+/// members are independent, readings of one run are not (Vuong's model comparison, paired by run).
 ///
 /// @param exponent  mean of the fitted exponents over the members, same window.
 Hypothesis CompareHypotheses(std::span<const DriftSeries> readings, double exponent);
@@ -69,18 +67,15 @@ struct Growth {
   bool hypothesis_resolved = false;  ///< see AnalyseGrowth()
 };
 
-/// A final drift below this many round-offs of the length is called "round-off". A thousand is the
-/// effect of rounding after N = 1e4 steps: random velocity errors add up to eps v sqrt(N),
-/// positions to eps v T sqrt(N / 3), with v T about ten lengths. Truncation at the tightest
-/// tolerance in use (1e-12) leaves more than ten thousand.
+/// A final drift below this many round-offs of the length is called "round-off". Rounding leaves a
+/// thousand after 1e4 steps, truncation at the tightest tolerance in use (1e-12) more than 1e4.
 inline constexpr double kRoundOffDrift = 1e3;
 
 /// Returns the exponent p in "drift grows like t^p": the least-squares slope of log(running
 /// maximum) against log t, per run and window; mean and spread over the ensemble.
 ///
-/// The residual scatter of one fit underestimates its error by a factor of 3 to 12 because
-/// residuals are periodic and correlated. The spread therefore comes from 16 to 32 runs with
-/// perturbed starts. One run resolves nothing.
+/// The spread comes from 16 to 32 runs with perturbed starts: the residual scatter of one fit
+/// underestimates its error, because residuals are periodic and correlated.
 ///
 /// All members use the same windows: T is the earliest of t_end, a run's end and saturation (a
 /// tenth of the length), and the first window starts no earlier than the last member leaves the
@@ -89,20 +84,16 @@ inline constexpr double kRoundOffDrift = 1e3;
 /// *Resolved* means all of:
 ///  1. at least 8 members and windows that are not too short;
 ///  2. |exponent - exponent_late| <= max(s, 0.05) with s^2 the mean of the squares of the two
-///     spreads. The measure is the spread and not the standard error s / sqrt(m): the question is
-///     whether one power law holds on both windows within the scatter of runs, and that must not
-///     become harder to affirm the more runs there are;
-///  3. s / sqrt(m) <= 0.125 for either spread, because with a large spread the second condition
-///     would hold for any numbers.
+///     spreads: one power law holds on both windows within the scatter of runs;
+///  3. s / sqrt(m) <= 0.125 for either spread and m members, because with a large spread the second
+///     condition would hold for any numbers.
 ///
 /// *Regime*: "round-off" if the geometric mean of the final running maxima is below `round_off`;
 /// else "too-short" if a window is; else "saturated" if some member passes saturation before t_end
-/// (the exponent then describes the time before); else "truncation". The regime is read off the
-/// size of the drift alone, so it is a label, not a diagnosis.
+/// (the exponent then describes the time before); else "truncation".
 ///
 /// *Hypothesis*: see CompareHypotheses(). It is resolved when it refutes its rivals and, for a
-/// power law, the exponent is resolved too; so an exponential law can be resolved while no exponent
-/// is.
+/// power law, the exponent is resolved too.
 ///
 /// @param length  characteristic length of the mechanism (a link), in the unit of the drift.
 /// @param round_off  in round-offs of the length
@@ -111,8 +102,7 @@ Growth AnalyseGrowth(std::span<const DriftSeries> runs, double t_end, double len
                      double round_off = kRoundOffDrift);
 
 /// Returns the running maximum of |value| at `points` times spaced evenly in log t, from the first
-/// positive time to the last. It is a compact log-log curve of drift. Empty if there is no interval
-/// or points < 2.
+/// positive time to the last. Empty if there is no interval or points < 2.
 DriftSeries Envelope(const DriftSeries& series, int points);
 
 /// Fit of the exponent p of cost = c size^p. Costs of real programs are not powers (fixed costs at
@@ -151,6 +141,11 @@ std::vector<std::string> FindUnitWarnings(const MechanismDescription& descriptio
 
 /// Returns a warning for each guess that a start q in joint coordinates misses.
 std::vector<std::string> FindGuessWarnings(const MechanismDescription& description,
+                                           const VectorX<double>& q);
+
+/// Returns a warning for each spring or damper whose points coincide at a start q in joint
+/// coordinates.
+std::vector<std::string> FindForceWarnings(const MechanismDescription& description,
                                            const VectorX<double>& q);
 
 /// Returns all warnings: on units and guesses, and on starts that are inconsistent, singular or
@@ -208,10 +203,9 @@ struct CoordinateRange {
   RangeEnd low, high;
 };
 
-/// The coordinate is held and moved in small steps, each from the last position. A step that does
-/// not close, or that ends far from the last position (on another branch), is halved until it is
-/// negligible. The gap of the loops grows in proportion to the way beyond a limit, so that limits
-/// are accurate to a few times the accepted gap, 1e-11 of the mechanism's size.
+/// Finds the limits of a coordinate. It is held and moved in small steps. A step that does not
+/// close, or that ends on another branch, is halved until it is negligible. Limits are accurate to
+/// a few times the accepted gap, 1e-11 of the mechanism's size.
 ///
 /// `joint` has one coordinate; a motion of the file is ignored. All other motions, except idle
 /// ones, must follow from it and from "fixed" joints; these do not count if they leave no motion.
@@ -222,6 +216,19 @@ CoordinateRange FindRange(MechanismDescription description, int joint);
 
 /// Final poses are alike that differ by at most so many tolerances: over links and in rad.
 inline constexpr double kMaxTolerances = 1000.0;
+
+/// Final poses nearer than this, over links and in rad, are alike for rounding's sake: below 1e-11
+/// comparisons hold all errors for round-off (harness/judge/judge.h).
+inline constexpr double kRoundOffShare = 1e-11;
+
+/// Returns the largest of the relative and the absolute tolerances of a run; NaN without.
+double ToleranceOf(const Record& record);
+
+bool IsFinishedRun(const Record& record);
+
+/// Returns true for agreement with the reference to the end of the run. Published data are sparse,
+/// so agreement with them does not prove the branch.
+bool IsCertified(const Record& record);
 
 struct Agreement {
   /// Runs of the same problem, horizon and tolerance with equal numbers have equal final poses. The
@@ -270,6 +277,7 @@ inline constexpr const char* kDriftWarning = "drift";
 inline constexpr const char* kErrorWarning = "error";
 inline constexpr const char* kRefinementWarning = "refinement";
 inline constexpr const char* kDriveWarning = "drive";
+inline constexpr const char* kSpringWarning = "spring";
 inline constexpr const char* kStepsWarning = "steps";
 inline constexpr const char* kMembersWarning = "ensemble-failures";
 inline constexpr const char* kExponentWarning = "exponent";
@@ -288,8 +296,9 @@ std::span<const WarningRow> WarningRows();
 /// Returns the expected drift growth at the record's level; empty for unknown levels.
 std::optional<DriftGrowth> GrowthAt(const Record& record);
 
-/// Returns the warning codes from an accuracy record alone, separated by spaces. Returns "" if
-/// there are none or if the run did not finish.
+/// Returns the warning codes from an accuracy record alone; none if the run did not finish.
+std::vector<std::string> OwnCodes(const Record& record);
+/// Returns them separated by spaces.
 std::string OwnWarnings(const Record& record);
 
 /// Sets `warnings` of every finished accuracy record, including warnings from comparisons of runs.

@@ -18,7 +18,6 @@ namespace loopbench::harness {
 
 namespace {
 
-/// Two records of one case.
 struct Pair {
   const Record& base;
   const Record& fresh;
@@ -26,7 +25,6 @@ struct Pair {
   bool same_settings;  ///< otherwise equal bits are not expected
 };
 
-/// A judgement with its reason.
 struct Ruling {
   Judgement judgement = Judgement::kSame;
   std::string why = {};
@@ -50,7 +48,6 @@ Ruling CompareTexts(Rule rule, const std::string& base, const std::string& fresh
                                             : Ruling{Judgement::kWorse, "new warnings"};
 }
 
-/// Worse above one limit, better below another.
 Ruling Between(double value, double lower, double upper, const std::string& why) {
   if (!std::isfinite(value) || value > upper) return {Judgement::kWorse, why};
   return value >= lower ? Ruling{} : Ruling{Judgement::kBetter, why};
@@ -67,7 +64,6 @@ Ruling CompareValues(const Pair& pair, const CompareOptions& options, Finding* f
   finding->ratio = fresh / base;
   switch (finding->measure.rule) {
     case Rule::kError: {
-      // round-off is not compared
       const double floor = options.error_floor;
       finding->ratio = std::max(std::abs(fresh), floor) / std::max(std::abs(base), floor);
       return CompareRatio(finding->ratio,
@@ -260,11 +256,6 @@ std::map<std::string, const Record*> ByCase(const std::vector<Record>& records,
 }
 
 }  // namespace
-
-std::string_view ToString(Judgement judgement) {
-  constexpr std::string_view kWords[] = {"same", "better", "worse", "different", "not measured"};
-  return kWords[static_cast<std::size_t>(judgement)];
-}
 
 int ComparisonReport::Count(Judgement judgement, std::string_view group) const {
   return static_cast<int>(std::ranges::count_if(findings, [&](const Finding& finding) {

@@ -16,8 +16,6 @@ namespace {
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-// Laws of growth.
-
 constexpr std::array<double, 4> kExponents = {0.5, 1.0, 1.5, 2.0};
 constexpr std::array<const char*, 5> kNames = {"t^0.5", "t^1", "t^1.5", "t^2", "exponential"};
 constexpr std::size_t kExponential = kExponents.size();
@@ -29,8 +27,7 @@ constexpr double kMinMeanSquare = 1e-20;
 /// information of this many independent ones. Used only for the penalty of a parameter.
 constexpr double kIndependentReadings = 16;
 /// Maximum distance of the fitted exponent from an accepted hypothesis. It covers the bias of a
-/// running maximum (0.05) and of finite windows (fitted exponents of mechanisms are 1.84 to 2.08
-/// instead of 2). It is below a third of the half unit between hypotheses.
+/// running maximum (0.05) and of finite windows (1.84 to 2.08 instead of 2).
 constexpr double kExponentTolerance = 0.15;
 /// Logarithm of the minimum growth of e^(k t) within the window; slower growth looks like a
 /// plateau.
@@ -47,7 +44,6 @@ double Mean(const std::vector<double>& values) {
   return sum / static_cast<double>(values.size());
 }
 
-/// Returns the sum of the squares of the distances from the mean.
 double SquaresAbout(double mean, const std::vector<double>& values) {
   double squares = 0;
   for (const double value : values) squares += (value - mean) * (value - mean);
@@ -116,7 +112,6 @@ bool IsPositive(const std::vector<double>& values) {
   return mean > kStandardErrors * std::sqrt(SquaresAbout(mean, values) / (count - 1) / count);
 }
 
-/// Returns true if the winner describes the data.
 bool Holds(std::size_t winner, const std::vector<Scores>& members, double exponent) {
   if (winner != kExponential) {
     return std::abs(exponent - kExponents[winner]) <= kExponentTolerance;
@@ -180,9 +175,8 @@ constexpr double kFloor = 10;
 constexpr double kShortestRatio = 4;
 constexpr int kFewestSamples = 16;
 /// Means of the two windows that differ by less than this agree even if the spread is smaller.
-/// The running maximum of a drift with period P lags by up to P. This alone raises a slope p by
-/// some p P / (2 t), where t is the window's start: 0.04 for p = 2 and seven periods. The spread
-/// does not show this bias, so windows should start after several periods.
+/// The running maximum of a drift with period P lags by up to P: that raises a slope p by some
+/// p P / (2 t) in windows from t on, 0.04 for p = 2 and seven periods.
 constexpr double kSlopeBias = 0.05;
 /// Largest standard error of either mean. Exponents that theory offers (1/2, 1, 3/2, 2) lie half
 /// a unit apart; two standard errors must stay within half of that.

@@ -17,11 +17,16 @@
 
 namespace loopbench::harness {
 
-// Demands on measures: keys, relations, and rules of comparison (harness/base/record.h).
+/// Returns the word of a value of an enumeration.
+template <class Enum, std::size_t size>
+std::string_view WordIn(const std::string_view (&words)[size], Enum value) {
+  return words[static_cast<std::size_t>(value)];
+}
+
+inline constexpr double kNoNumber = std::numeric_limits<double>::quiet_NaN();
 
 /// Returns the group of a rule, for `--only` and the summary.
 std::string_view GroupOf(Rule rule);
-/// Returns all groups.
 const std::vector<std::string>& GroupNames();
 
 /// State of a record's value for a measure.
@@ -57,12 +62,11 @@ std::set<std::string> RepeatedCases(std::span<const Record> records);
 /// content ...". Content is the mechanism, limits and ensemble (harness/run/run.h).
 std::string OtherSettings(const Record& base, const Record& fresh);
 
-/// Relation of a value: a number at most, at least, equal to or within a tolerance of another
-/// number, or a text equal to or different from a word.
+/// Relation of a value to a number (at most, at least, equal, within a tolerance) or to a word.
 enum class Relation { kAtMost, kAtLeast, kEqual, kWithin, kIs, kIsNot };
 
-/// Demand on a measure. A claim makes demands on a statistic of records, a robustness map on every
-/// record of a cell, a comparison on a new and a base value.
+/// Demand on a measure: of a claim on a statistic of records, of a robustness map on every record
+/// of a cell.
 struct Demand {
   std::string measure = {};  ///< key in the record
   std::string name = {};     ///< short name for cells, or ""
@@ -81,18 +85,16 @@ struct Demand {
 struct Judged {
   bool measured = false, met = false;
   std::string measure = {}, name = {}, unit = {};  ///< the demand's
-  double value = std::numeric_limits<double>::quiet_NaN();
-  double limit = std::numeric_limits<double>::quiet_NaN();  ///< limit that was applied
+  double value = kNoNumber, limit = kNoNumber;     ///< measured, and the limit that was applied
   /// value / limit, or limit / value for lower limits: above 1 the limit is violated. Infinite for
   /// values that are not finite or not equal, 0 for equal values.
-  double ratio = std::numeric_limits<double>::quiet_NaN();
-  double total = std::numeric_limits<double>::quiet_NaN();  ///< for counts: total from Demand::of
-  std::string reason = {};  ///< "energy_error_max = 0.016 [J], limit 5e-06", or the missing key
+  double ratio = kNoNumber;
+  double total = kNoNumber;  ///< for counts: total from Demand::of
+  std::string reason = {};   ///< "energy_error_max = 0.016 [J], limit 5e-06", or the missing key
 };
 
-/// Returns true if a number meets the demand. Non-finite numbers never do.
+/// Returns true if a number, or a text, meets the demand. Non-finite numbers never do.
 bool Meets(const Demand& demand, double value);
-/// Returns true if a text meets the demand.
 bool Meets(const Demand& demand, const std::string& text);
 
 /// Evaluates a number of the record with the limit scaled by the record's `of`.
@@ -103,14 +105,10 @@ Judged Judge(const Demand& demand, const Record& record);
 std::string ToText(const Demand& demand, const std::string& subject, bool rounded);
 inline std::string ToText(const Demand& demand) { return ToText(demand, demand.measure, false); }
 
-// Claims about stored records: verdicts, computed from records by rules.
-//
-// A rule (configs/experiments/paper/claims.json) restates one claim as checks. Each check selects
-// records, takes a statistic of one measure and compares it with a threshold. The verdict depends
-// on the checks only and is never written by hand.
+// Claims. A rule (configs/experiments/paper/claims.json) restates a claim as checks: each takes a
+// statistic of one measure of selected records and compares it with a threshold.
 
-/// Statistic of the selected rows: one number (max, min, mean), or a demand on every row or on at
-/// least one row.
+/// One number of the selected rows (max, min, mean), or a demand on all of them or on any.
 enum class Statistic { kMax, kMin, kMean, kAll, kAny };
 
 /// Condition of a claim: a demand on a statistic of selected records.
@@ -126,13 +124,9 @@ struct Check {
 
 /// Sentence for each verdict, printed after it. Empty sentences are left out.
 struct Wording {
-  std::string reproduced;
-  std::string not_reproduced;
-  std::string only_under;
-  std::string not_measured;
+  std::string reproduced, not_reproduced, only_under, not_measured;
 };
 
-/// Claim of the paper with its checks.
 struct ClaimRule {
   std::string id;
   std::string claim;  ///< claim in one sentence
@@ -166,7 +160,7 @@ struct ClaimResult {
 };
 
 /// Evaluates one check. Kinds of records without the measure (timing for a drift check) are
-/// ignored, unless their run failed. If no record is left, the state is kNotMeasured, never kHolds.
+/// ignored, unless their run failed. If no record is left, the state is kNotMeasured.
 /// An unfinished run ("outcome" other than "finished") or a record that violates `require` makes
 /// the check fail. Failed runs are allowed if the check measures or selects the outcome, or if
 /// failed_runs_hold. A missing or non-finite value, or a ratio 0 / 0, makes the check kNotMeasured,
@@ -179,17 +173,17 @@ CheckResult Evaluate(const Check& check, std::span<const Record> records);
 /// checks that hold, fail and are not measured.
 ClaimResult Evaluate(const ClaimRule& rule, std::span<const Record> records);
 
-/// Returns "reproduced", "not reproduced", "partially reproduced" or "not measured".
-std::string_view ToString(Verdict verdict);
-/// "holds", "fails", "not measured".
-std::string_view ToString(CheckState state);
+inline std::string_view ToString(Verdict verdict) {
+  return WordIn({"reproduced", "not reproduced", "partially reproduced", "not measured"}, verdict);
+}
+inline std::string_view ToString(CheckState state) {
+  return WordIn({"holds", "fails", "not measured"}, state);
+}
 
-/// Reads a file (docs/fields.md, claims). Throws ConfigError with all errors (unknown keys, wrong
-/// types, missing or misplaced thresholds, repeated ids or labels), each with file, JSON Pointer,
-/// found and expected value.
+/// Reads a file, or a text with this name of its file (docs/fields.md, claims). Throws ConfigError
+/// with all errors (unknown keys, wrong types, missing or misplaced thresholds, repeated ids or
+/// labels), each with file, JSON Pointer, found and expected value.
 std::vector<ClaimRule> ReadClaims(const std::filesystem::path& path);
-
-/// Reads rules from text; `file` is the name used in messages.
 std::vector<ClaimRule> ParseClaims(std::string_view text, const std::string& file);
 
 /// Returns one row per claim: id, claim, section of the paper, verdict.
@@ -203,15 +197,13 @@ Table CheckTable(const ClaimResult& result);
 std::string ClaimsMarkdown(std::span<const ClaimResult> results,
                            const std::vector<std::string>& notes);
 
-// Comparison of new measurements with a base, used as the gate of CI.
-//
-// Counts and hashes are compared exactly, errors and instructions by their ratio, times by a
-// statistical test on one machine only. Incomparable values are reported with the reason, never
-// counted as equal. A missing or invalid value is a difference.
+// Comparison of new measurements with a base, used as the gate of CI. Counts and hashes are
+// compared exactly, errors and instructions by their ratio, times by a statistical test on one
+// machine only. Incomparable values are reported with the reason, never counted as equal.
 
 struct CompareOptions {
-  double error_ratio =
-      1.05;  ///< limit for errors with equal arithmetic: equal code gives equal bits
+  /// Limit for errors with equal arithmetic: equal code gives equal bits.
+  double error_ratio = 1.05;
   /// Limit for errors if the arithmetic differs: different round-off changes steps and drift.
   double error_ratio_other = 1.5;
   /// Errors below it count as equal round-off. It exceeds the largest round-off drift of the
@@ -235,7 +227,9 @@ enum class Judgement {
   kDifferent,  ///< only in NEW, or invalid in BASE: neither better nor worse
   kNotMeasured,
 };
-std::string_view ToString(Judgement judgement);
+inline std::string_view ToString(Judgement judgement) {
+  return WordIn({"same", "better", "worse", "different", "not measured"}, judgement);
+}
 
 /// Result for one measure of one case.
 struct Finding {
@@ -243,8 +237,8 @@ struct Finding {
   Measure measure = {};
   Judgement judgement = Judgement::kSame;
   std::string base = {}, fresh = {};  ///< as printed: numbers, medians, hashes
-  double ratio = std::numeric_limits<double>::quiet_NaN();  ///< new / base, if meaningful
-  double p = std::numeric_limits<double>::quiet_NaN();      ///< for times: p-value adjusted by Holm
+  double ratio = kNoNumber;           ///< new / base, if meaningful
+  double p = kNoNumber;               ///< for times: p-value adjusted by Holm
   double least_p = 0.0;   ///< for times: smallest possible p-value of the sample sizes, unadjusted
   bool is_apart = false;  ///< for times: separated samples (compare.cpp)
   bool on_both = true;    ///< both sides have a value of the measure
@@ -274,11 +268,8 @@ struct ComparisonReport {
 ComparisonReport Compare(const std::vector<Record>& base, const std::vector<Record>& fresh,
                          const CompareOptions& options);
 
-// Robustness map: methods and stress tests, each cell evaluated from records by rules.
-//
-// A rules file (configs/experiments/extremes/map.json) contains methods (columns), stress tests
-// (rows) and for each row the deciding measures. A cell's class and deciding number depend on the
-// records only and are never written by hand.
+// Robustness map: methods (columns) and stress tests (rows), each cell evaluated from records by
+// the deciding measures of its row (configs/experiments/extremes/map.json).
 
 /// Stress test: a row of the map.
 struct MapRow {
@@ -327,8 +318,11 @@ inline constexpr std::array kCellStates = {CellState::kHolds,        CellState::
                                            CellState::kBroken,       CellState::kNotMeasured,
                                            CellState::kNotApplicable};  ///< in the order of legends
 
-/// "holds", "stopped", "limit", "inaccurate", "broken", "not measured", "not applicable".
-std::string_view ToString(CellState state);
+inline std::string_view ToString(CellState state) {
+  return WordIn(
+      {"holds", "not applicable", "not measured", "stopped", "limit", "inaccurate", "broken"},
+      state);
+}
 
 /// Outcomes that rules may name, and the state of a run with this outcome if it is not expected.
 struct RunEnding {
@@ -357,12 +351,11 @@ struct MapCell {
   CellState state = CellState::kNotMeasured;
   /// Class: "singular", "time-limit", ... for an unexpected outcome, otherwise the state's name.
   std::string word = "not measured";
-  std::string outcome;  ///< outcome of the deciding run
-  std::string case_id;  ///< of the deciding run
+  std::string outcome, case_id;  ///< of the deciding run
   /// Deciding measure: the unmet measure furthest beyond its limit, otherwise the measure closest
   /// to its limit. Empty if the outcome decided.
   Judged decided;
-  double t_reached = std::numeric_limits<double>::quiet_NaN();  ///< [s]
+  double t_reached = kNoNumber;  ///< [s]
   std::size_t holding = 0, records = 0;
   /// Number of holding runs with warnings, and the warning codes with counts: "energy 2".
   std::size_t flagged = 0;
@@ -370,18 +363,15 @@ struct MapCell {
   std::size_t cases = 0;  ///< expected number of records, at least `records`
   std::string reason;     ///< text: all measures beyond their limits, the run's message, ...
   bool demanded = false;
+
+  /// True if a holding run has a warning: a false alarm, or the map's demands are weaker.
+  bool HoldsWithWarnings() const { return state == CellState::kHolds && flagged > 0; }
 };
 
 /// Evaluates one cell: its worst run. Only records of kind "accuracy" are used, unless a selection
 /// names the kind.
 MapCell JudgeCell(const MapRow& row, std::size_t column, const MapMethod& method,
                   std::span<const Record> records);
-
-/// Returns true if the cell holds and one of its holding runs has a warning. The warning is then a
-/// false alarm, or the map's demands are weaker.
-inline bool HoldsWithWarnings(const MapCell& cell) {
-  return cell.state == CellState::kHolds && cell.flagged > 0;
-}
 
 /// Rules, and the cells by group, row and column.
 struct RobustnessMap {
@@ -408,8 +398,7 @@ void EachCell(Map& map, const Visit& visit) {
 /// Returns the class, with the outcome if it is not "finished": "holds: locked".
 std::string ClassText(const MapCell& cell);
 
-/// Returns the deciding number: "branch 2.1e-09 rad", "397 of 400", "at 0.31 s"; "" if there is
-/// none.
+/// Returns the deciding number: "branch 2.1e-09 rad", "397 of 400", "at 0.31 s"; or "".
 std::string DecidingNumber(const MapCell& cell);
 
 /// Returns "3/4" if more than one record exists or is expected, otherwise "".
@@ -419,22 +408,40 @@ std::string HoldingCount(const MapCell& cell);
 /// not hold.
 std::vector<std::string> BrokenDemands(const RobustnessMap& map);
 
-/// Reads a file (docs/fields.md, map). Throws ConfigError with all errors (unknown keys, wrong
-/// types, unknown outcomes or column labels, repeated labels, rows without criteria), each with
-/// file, JSON Pointer, found and expected value.
+/// Reads a file, or a text with this name of its file (docs/fields.md, map). Throws ConfigError
+/// with all errors (unknown keys, wrong types, unknown outcomes or column labels, repeated labels,
+/// rows without criteria), each with file, JSON Pointer, found and expected value.
 MapRules ReadMapRules(const std::filesystem::path& path);
-
-/// Reads rules from text; `file` is the name used in messages.
 MapRules ParseMapRules(std::string_view text, const std::string& file);
 
-// Work-precision comparison. Cost of accuracy: each accuracy run of a store with the time of the
-// same case, the Pareto front of each problem, and the cheapest method of each formulation for an
-// error.
-//
-// A run that failed or has warnings is a row with its reason. It is excluded from fronts and from
-// the cheapest methods, because its error is unreliable.
+/// Returns the map of these rules with the cells of robustness-map.csv (MapCellTable()), for
+/// pictures: the original store is large and rarely kept. Each cell has its state and requirement;
+/// numbers and reasons are not read.
+///
+/// @throws ConfigError with file, line and found text if the CSV is invalid or its cells differ
+/// from the rules.
+RobustnessMap MapFromCsv(const MapRules& rules, std::string_view csv, const std::string& file);
 
-/// Options of the work-precision comparison.
+/// Returns "3 of 877 cells that hold have runs with warnings".
+std::string CountFlagged(const RobustnessMap& map);
+
+/// Returns one row per stress test and one column per method (by letter, named in the notes),
+/// coloured by state on a terminal: "ok 2.1e-09", "singular at 0.31 s 3/4", "?" for not measured,
+/// "-" for not applicable.
+Table MapTable(const RobustnessMap& map);
+
+/// Returns one row per cell with all deciding data in full precision: robustness-map.csv.
+Table MapCellTable(const RobustnessMap& map);
+
+/// Returns robustness-map.md: a table per group, the limits with reasons, and every cell that does
+/// not hold with number and message. `notes` (provenance) are at the end.
+std::string MapMarkdown(const RobustnessMap& map, const std::vector<std::string>& notes);
+
+// Work-precision comparison: each accuracy run of a store with the time of the same case, the
+// Pareto front of each problem, and the cheapest method of each formulation for an error. A run
+// that failed or has warnings is a row with its reason, excluded from fronts and from the cheapest
+// methods, because its error is unreliable.
+
 struct WorkPrecisionOptions {
   /// Key of the error; "" for the first of UsualErrors() that records have.
   std::string error = "";
@@ -459,8 +466,7 @@ bool IsErrorOfPositions(const std::string& key);
 struct WorkPrecisionRow {
   Record record;  ///< the run's record with additional keys of its timing
   Record timing;  ///< timing of the same case; without keys if there is none
-  double error = std::numeric_limits<double>::quiet_NaN();
-  double cost = std::numeric_limits<double>::quiet_NaN();
+  double error = kNoNumber, cost = kNoNumber;
   /// True if the measured error is not above the certified error of the reference. `error` is then
   /// an upper bound, the sum of both.
   bool is_bound = false;
@@ -472,9 +478,8 @@ struct WorkPrecisionRow {
 struct Cheapest {
   double error_class = 0.0;
   std::string formulation;
-  int row = -1;  ///< index into the problem's rows; -1: none
-  double ratio = std::numeric_limits<double>::quiet_NaN();  ///< cost relative to the cheapest of
-                                                            ///< all formulations
+  int row = -1;              ///< index into the problem's rows; -1: none
+  double ratio = kNoNumber;  ///< cost relative to the cheapest of all formulations
 };
 
 /// Rows of one mechanism and horizon (WorkPrecisionOptions::per), cheapest first, rows without cost
@@ -503,31 +508,6 @@ WorkPrecision MakeWorkPrecision(std::span<const Record> records,
 /// ("warning: ...") are for costs that are incomparable times.
 std::vector<std::string> FairnessStatement(const WorkPrecision& work_precision);
 
-// Tables and documents of robustness maps and work-precision comparisons.
-
-/// Returns the map of these rules with the cells of robustness-map.csv (MapCellTable()), for
-/// pictures: the original store is large and rarely kept. Each cell has its state and requirement;
-/// numbers and reasons are not read.
-///
-/// @throws ConfigError with file, line and found text if the CSV is invalid or its cells differ
-/// from the rules.
-RobustnessMap MapFromCsv(const MapRules& rules, std::string_view csv, const std::string& file);
-
-/// Returns "3 of 877 cells that hold have runs with warnings".
-std::string CountFlagged(const RobustnessMap& map);
-
-/// Returns one row per stress test and one column per method (by letter, named in the notes),
-/// coloured by state on a terminal: "ok 2.1e-09", "singular at 0.31 s 3/4", "?" for not measured,
-/// "-" for not applicable.
-Table MapTable(const RobustnessMap& map);
-
-/// Returns one row per cell with all deciding data in full precision: robustness-map.csv.
-Table MapCellTable(const RobustnessMap& map);
-
-/// Returns robustness-map.md: a table per group, the limits with reasons, and every cell that does
-/// not hold with number and message. `notes` (provenance) are at the end.
-std::string MapMarkdown(const RobustnessMap& map, const std::vector<std::string>& notes);
-
 /// Rows and width of a table.
 struct WorkPrecisionView {
   bool compact = true;  ///< few columns and short words, for a terminal of about 100 columns
@@ -552,41 +532,6 @@ Table CheapestTable(const WorkPrecision& work_precision);
 std::string WorkPrecisionMarkdown(const WorkPrecision& work_precision,
                                   const std::vector<std::string>& notes);
 
-// Statistics of samples, and fitted exponents.
-
-/// Returns the median; NaN for an empty sample or a sample with NaN.
-double Median(std::span<const double> sample);
-
-/// Result of the Mann-Whitney test of two independent samples.
-struct MannWhitneyResult {
-  double u = 0.0;        ///< number of pairs (a, b) with a > b; equal pairs count one half
-  double p_greater = 1;  ///< probability of at least this u under equal distributions
-  bool exact = false;    ///< p from the exact distribution, otherwise normal approximation
-};
-
-/// H1: values of `a` tend to be larger than those of `b` (H. B. Mann, D. R. Whitney, 1947). Exact
-/// without ties and up to 40 values in a sample; otherwise normal with corrections for ties and
-/// continuity. p = 1 when a sample is empty. The samples are finite numbers.
-MannWhitneyResult MannWhitney(std::span<const double> a, std::span<const double> b);
-
-/// Returns the smallest possible p_greater for these sample sizes.
-double SmallestP(std::size_t a, std::size_t b);
-
-/// Returns p-values adjusted by Holm's step-down method (S. Holm, 1979), in the given order.
-/// Rejecting values up to alpha keeps the probability of any false rejection below alpha, for any
-/// dependence.
-std::vector<double> HolmAdjusted(std::span<const double> p);
-
-/// Returns exponents of time over size, one row per family of right-hand sides. A family is a set
-/// of benchmarks whose names differ in one number ("rhs/chain/10/odca/...",
-/// "rhs/chain/30/odca/..."), or timings of equal methods with mechanisms "chain-10" and "chain-30".
-/// Sizes are numbers of bodies (counter "bodies"), or the numeric part without this counter. Keys:
-/// "family", "sizes", "bodies_min", "bodies_max", "exponent", "standard_error", "slope_min",
-/// "slope_max", "ns_per_body" at the largest size, "failed" (members of the family that ended with
-/// an error, of any size). Names without a numeric part and families with one member are left out;
-/// families with fewer than two measured sizes have no exponent. Sizes below `from` are ignored.
-std::vector<Record> FitFamilies(const std::vector<Record>& measured, double from);
-
 // Measurements over commits, for trackers and for a table.
 
 /// Tracked number; smaller is better.
@@ -595,8 +540,7 @@ struct TrackedValue {
   double value = 0.0;
   double lower = 0.0, upper = 0.0;  ///< spread; equal to value if there is none
   double least = 0.0;  ///< minimum of a sample, least disturbed by other work on the machine
-  /// Calibration time of the machine for times [ns]; NaN if unknown.
-  double calibration = std::numeric_limits<double>::quiet_NaN();
+  double calibration = kNoNumber;  ///< of the machine for times [ns]; NaN if unknown
 };
 
 /// github-action-benchmark, tool "customSmallerIsBetter":
@@ -616,7 +560,6 @@ struct TrackedRecords {
   /// repeated cases.
   std::vector<std::string> left_out;
 };
-
 TrackedRecords TrackRecords(const std::vector<Record>& records);
 
 }  // namespace loopbench::harness

@@ -72,7 +72,6 @@ void ReadNamed(const std::vector<JsonNode>& elements, const char* key, std::stri
   }
 }
 
-/// Reads a file of this kind.
 template <class T>
 T ParseRules(std::string_view text, const std::string& file, FileKind kind,
              const Fields<T>& fields) {
@@ -82,8 +81,6 @@ T ParseRules(std::string_view text, const std::string& file, FileKind kind,
     return rules;
   });
 }
-
-// Claims.
 
 /// Reads `key` if the comparison uses it, otherwise reports it.
 std::optional<JsonNode> Belonging(const JsonNode& check, const std::string& key, bool belongs,
@@ -105,7 +102,6 @@ void ReadRelation(const JsonNode& node, Check& check) {
   check.demand.relation = kRelations[node.Choice(kRelationNames, "a comparison").value_or(0)];
 }
 
-/// Reads the keys of the comparison and checks the statistic.
 void ReadDemand(const JsonNode& node, Check& check) {
   Demand& demand = check.demand;
   const bool words = demand.IsText(), within = demand.relation == Relation::kWithin;
@@ -203,8 +199,8 @@ struct ClaimsFile {
 };
 
 void ReadRules(const JsonNode& node, ClaimsFile& file) {
-  if (node.value().empty()) node.Fail("at least one claim");
-  ReadNamed(node.Elements("claims"), "id", &ClaimRule::id, RuleInFile(), RuleFields(), &file.rules);
+  ReadNamed(node.Elements("claims", "at least one claim"), "id", &ClaimRule::id, RuleInFile(),
+            RuleFields(), &file.rules);
 }
 
 const Fields<ClaimsFile>& ClaimsFields() {
@@ -212,12 +208,10 @@ const Fields<ClaimsFile>& ClaimsFields() {
       "claims",
       "Rules that turn stored records into verdicts (loopbench check-claims). The program also "
       "checks that ids, and labels of one claim, are different.",
-      DocumentRows<ClaimsFile>({{"claims", By(ArraySchema(RuleFields().Schema()), ReadRules),
+      DocumentRows<ClaimsFile>({{"claims", By(ArraySchema(RuleFields().Schema(), 1), ReadRules),
                                  "List of claims.", "an array of claims"}}));
   return fields;
 }
-
-// Robustness maps.
 
 const NameList& EndingNames() {
   static const NameList names = [] {

@@ -21,9 +21,8 @@ namespace {
 
 constexpr std::size_t kLargestExact = 40;
 
-/// Probability of each u from 0 to a b, when all orders of a + b different values are equally
-/// likely. With f(u; a, b) = share of orders: the largest value belongs to the first sample with
-/// probability a / (a + b), and then lies above all b others.
+/// Probability f(u; a, b) of each u from 0 to a b, when all orders of a + b different values are
+/// equally likely: the largest is of the first sample with probability a / (a + b), above all b.
 std::vector<double> ExactDistribution(std::size_t a, std::size_t b) {
   // rows[i] holds f(.; i, j) for the current j
   std::vector<std::vector<double>> rows(a + 1, std::vector<double>{1.0});
@@ -64,7 +63,7 @@ double NormalTail(double u, double a, double b, double ties) {
 using TrackerDocument = nlohmann::ordered_json;
 
 bool HasSpread(const TrackedValue& value) {
-  return std::isfinite(value.lower) && std::isfinite(value.upper) && value.lower < value.upper;
+  return value.lower < value.upper && std::isfinite(value.lower) && std::isfinite(value.upper);
 }
 
 std::string DumpTracker(const TrackerDocument& document) {
@@ -129,7 +128,6 @@ MannWhitneyResult MannWhitney(std::span<const double> a, std::span<const double>
 }
 
 double SmallestP(std::size_t a, std::size_t b) {
-  // one order of (a + b choose a)
   double p = 1.0;
   for (std::size_t i = 1; i <= a; ++i) {
     p *= static_cast<double>(i) / static_cast<double>(b + i);
@@ -153,13 +151,12 @@ std::vector<double> HolmAdjusted(std::span<const double> p) {
 
 namespace {
 
-/// A name with its numeric part replaced by "N".
+/// A name with its numeric part replaced by "N"; empty unless there is exactly one such part.
 struct FamilyName {
   std::string name;
   double size = 0.0;
 };
 
-/// Splits a name; `name` is empty unless there is exactly one numeric part.
 FamilyName Split(const std::string& benchmark) {
   FamilyName family;
   int numbers = 0;
@@ -192,64 +189,52 @@ std::string BenchmarkNameOf(const Record& record) {
   for (const char* key : {"formulation", "enforcement", "coordinates", "solver", "integrator"}) {
     if (const std::string word = record.Text(key); !word.empty()) name += "/" + word;
   }
-  const std::string threads = record.Text("threads");
-  if (!threads.empty()) name += "/" + threads + "-threads";
-  if (const std::string word = record.Text("execution"); !word.empty()) name += "/" + word;
+  for (const auto& [key, ending] : {std::pair("threads", "-threads"), {"execution", ""}}) {
+    if (const std::string word = record.Text(key); !word.empty()) name += "/" + word + ending;
+  }
   return name;
 }
-
-struct Points {
-  std::vector<double> sizes, times;
-  std::int64_t failed = 0;
-};
 
 }  // namespace
 
 std::vector<Record> FitFamilies(const std::vector<Record>& measured, double from) {
-  std::vector<std::string> order;
-  std::map<std::string, Points> families;
-  for (const Record& record : measured) {
-    const FamilyName family = Split(BenchmarkNameOf(record));
-    if (family.name.empty()) continue;
-    const auto [at, is_new] = families.try_emplace(family.name);
-    if (is_new) order.push_back(family.name);
-    const double bodies = record.Number("bodies");
-    const double size = std::isnan(bodies) ? family.size : bodies;
-    const double time = Median(record.Numbers(
-        record.Find("series.cpu_ns") != nullptr ? "series.cpu_ns" : "series.rhs_ns"));
-    if (record.Text("outcome") != "finished" || std::isnan(time)) {
-      ++at->second.failed;
-    } else if (size >= from) {
-      at->second.sizes.push_back(size);
-      at->second.times.push_back(time);
-    }
-  }
   std::vector<Record> rows;
-  for (const std::string& name : order) {
-    const Points& points = families[name];
-    const PowerFit fit = FitPower(points.sizes, points.times);
+  const auto name_of = [](const Record& record) { return Split(BenchmarkNameOf(record)).name; };
+  for (const auto& [name, members] : GroupBy(measured, name_of)) {
+    if (name.empty()) continue;
+    std::vector<double> sizes, times;
+    std::int64_t failed = 0;
+    for (const Record& record : members) {
+      const double bodies = record.Number("bodies");
+      const double size = std::isnan(bodies) ? Split(BenchmarkNameOf(record)).size : bodies;
+      const double time = Median(record.Numbers(
+          record.Find("series.cpu_ns") != nullptr ? "series.cpu_ns" : "series.rhs_ns"));
+      if (record.Text("outcome") != "finished" || std::isnan(time)) {
+        ++failed;
+      } else if (size >= from) {
+        sizes.push_back(size);
+        times.push_back(time);
+      }
+    }
+    const PowerFit fit = FitPower(sizes, times);
     // a family with too few finished members has no exponent
-    if (fit.sizes + points.failed < 2) continue;
-    Record row;
+    if (fit.sizes + failed < 2) continue;
+    Record& row = rows.emplace_back();
     row.Set("family", name);
     row.Set("sizes", std::int64_t{fit.sizes});
-    row.Set("failed", points.failed);
-    rows.push_back(row);
+    row.Set("failed", failed);
     if (fit.sizes < 2) continue;
-    const auto largest = std::ranges::max_element(points.sizes) - points.sizes.begin();
+    const auto largest = std::ranges::max_element(sizes) - sizes.begin();
     row.Set("bodies_min", std::round(fit.smallest * 1e6) / 1e6);
     row.Set("bodies_max", std::round(fit.largest * 1e6) / 1e6);
     row.Set("exponent", fit.exponent);
     row.Set("standard_error", fit.standard_error);
     row.Set("slope_min", fit.slope_min);
     row.Set("slope_max", fit.slope_max);
-    row.Set("ns_per_body", points.times[static_cast<std::size_t>(largest)] / fit.largest);
-    rows.back() = std::move(row);
+    row.Set("ns_per_body", times[static_cast<std::size_t>(largest)] / fit.largest);
   }
   return rows;
 }
-
-// Measurements for trackers.
 
 std::string ToCustomSmallerIsBetter(const std::vector<TrackedValue>& values) {
   TrackerDocument document = TrackerDocument::array();

@@ -34,7 +34,6 @@ std::string BodyNames(const MechanismDescription& description, const std::vector
   return ListInWords(names);
 }
 
-/// A line in ground axes.
 struct Line {
   Vector3d point, direction;
 };
@@ -81,7 +80,6 @@ class IdleSearch {
  private:
   const Joint<Spatial, double>& At(int joint) const { return mechanism_.joints()[joint]; }
 
-  /// Returns the joint's point on the body of the group.
   Vector3d PointOn(int group, int j) const {
     const bool is_second = group_[At(j).to] == group;
     const Pose<Spatial, double>& X_W = kinematics_.poses()[is_second ? At(j).to : At(j).from];
@@ -272,7 +270,6 @@ constexpr double kFar = 10.0;     ///< [lengths]
 constexpr double kInLine = 1e-4;  ///< sine of an angle: the root of a limit's accuracy, and more
 constexpr double kGap = 1e-15;    ///< accuracy of the input meanwhile: round-off decides
 
-/// A closed position.
 struct Place {
   MechanismDescription description;  ///< with it as its start
   std::vector<Frame> bodies;         ///< at their origins

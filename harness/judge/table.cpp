@@ -20,20 +20,10 @@ namespace {
 
 std::string FormatNumber(double number, Format format) {
   if (std::isnan(number)) return "";
-  switch (format) {
-    case Format::kInteger:
-      return fmt::format("{:.0f}", number);
-    case Format::kScientific:
-      return fmt::format("{:.2e}", number);
-    case Format::kExponent:
-      return fmt::format("{:.2f}", number);
-    case Format::kFixed:
-      return fmt::format("{:.1f}", number);
-    case Format::kSeconds:
-      return fmt::format("{:.4g}", number);
-    default:
-      return NumberCell(number);
-  }
+  // in the order of Format
+  constexpr const char* kFormats[] = {"", "{:.0f}", "", "{:.2e}", "{:.2f}", "{:.1f}", "{:.4g}"};
+  const std::string_view digits = kFormats[static_cast<std::size_t>(format)];
+  return digits.empty() ? NumberCell(number) : fmt::format(fmt::runtime(digits), number);
 }
 
 // Returns every digit, for CSV: absent and NaN values are empty as in the other writers.
@@ -64,12 +54,24 @@ std::vector<TableColumn> FlatColumns(const Table& table) {
   return columns;
 }
 
+using RowGroup = std::pair<std::string, std::vector<Record>>;
+
+/// Returns the rows by the value of the group's key, under "key = value"; without a heading if the
+/// table is undivided.
+std::vector<RowGroup> Groups(const Table& table) {
+  if (table.group.empty()) return {{"", table.rows}};
+  return GroupBy(table.rows, [&](const Record& row) {
+    const std::string cell = Cell(row, {table.group, table.group, Format::kShortest});
+    return fmt::format("{} = {}", table.group, cell.empty() ? "(none)" : cell);
+  });
+}
+
 /// Returns the text of each group, with an empty line between them; `heading` writes its heading.
 std::string TextOfGroups(const Table& table,
                          const std::function<std::string(const std::string&)>& heading,
                          const std::function<std::string(const std::vector<Record>&)>& rows) {
   return Joined(Groups(table), "\n", [&](const RowGroup& group) {
-    return (group.heading.empty() ? "" : heading(group.heading) + "\n\n") + rows(group.rows);
+    return (group.first.empty() ? "" : heading(group.first) + "\n\n") + rows(group.second);
   });
 }
 
@@ -103,20 +105,6 @@ std::string Cell(const Record& row, const TableColumn& column) {
   const auto it =
       std::ranges::find(column.abbreviations, text, &std::pair<std::string, std::string>::first);
   return (it == column.abbreviations.end() ? text : it->second) + mark;
-}
-
-std::vector<RowGroup> Groups(const Table& table) {
-  if (table.group.empty()) return {{"", table.rows}};
-  const TableColumn column{table.group, table.group, Format::kShortest};
-  std::vector<RowGroup> groups;
-  for (const Record& row : table.rows) {
-    const std::string cell = Cell(row, column);
-    const std::string heading = fmt::format("{} = {}", table.group, cell.empty() ? "(none)" : cell);
-    auto it = std::ranges::find(groups, heading, &RowGroup::heading);
-    if (it == groups.end()) it = groups.insert(it, {heading, {}});
-    it->rows.push_back(row);
-  }
-  return groups;
 }
 
 Record& AddRow(std::initializer_list<AnyValue> values, Table* table) {
@@ -174,8 +162,6 @@ std::string ToMarkdown(const Table& table) {
   return out;
 }
 
-// JSON writer for programs, and selection among all writers.
-
 std::string ToJson(const Table& table) {
   const std::vector<TableColumn> columns = FlatColumns(table);
   const std::string provenance = fmt::format("{}", fmt::join(table.notes, "\n"));
@@ -203,8 +189,6 @@ std::string Render(const Table& table, const std::string& format) {
   return ToCsv(flat);
 }
 
-// Fit of tables to a terminal.
-
 namespace {
 
 /// Column as text: digits are aligned, with or without a mark after them.
@@ -219,7 +203,6 @@ struct TextColumn {
     }
   }
 
-  /// Returns at least one line.
   std::vector<std::string> LinesOf(const Record& row) const {
     const std::string cell =
         EscapeTerminal(Cell(row, column)) + (marked && !IsFlagged(row, column.key) ? " " : "");
@@ -233,10 +216,9 @@ struct TextColumn {
 };
 
 bool IsSameInAllRows(const Table& table, const TableColumn& column) {
-  if (table.rows.size() < 2) return false;
-  const std::string first = Cell(table.rows.front(), column);
-  return std::ranges::all_of(table.rows,
-                             [&](const Record& row) { return Cell(row, column) == first; });
+  return table.rows.size() > 1 && std::ranges::all_of(table.rows, [&](const Record& row) {
+           return Cell(row, column) == Cell(table.rows.front(), column);
+         });
 }
 
 /// Returns column indices among ColumnsUnderHeading() in drop order (FitWidth()).
@@ -278,7 +260,6 @@ struct Fitting {
   bool stays = true;
 };
 
-/// Returns the total width including gaps.
 std::size_t Taken(const std::vector<Fitting>& columns, std::size_t Fitting::*width) {
   std::size_t sum = 0;
   for (const Fitting& one : columns) {
@@ -397,16 +378,13 @@ LatexColumn LatexColumnOf(const Table& table, const TableColumn& column) {
   return one;
 }
 
-double WidthOf(const std::vector<LatexColumn>& columns, const Setting& setting) {
-  double width = 0.0;
-  for (const LatexColumn& one : columns) width += setting.scale * one.width + 2.0 * setting.gap_pt;
-  return width;
-}
-
-/// Returns the first setting that fits.
 std::optional<Setting> SettingFor(const std::vector<LatexColumn>& columns) {
   for (const Setting& setting : kSettings) {
-    if (WidthOf(columns, setting) <= (setting.landscape ? kTextHeight : kTextWidth)) return setting;
+    double width = 0.0;
+    for (const LatexColumn& one : columns) {
+      width += setting.scale * one.width + 2.0 * setting.gap_pt;
+    }
+    if (width <= (setting.landscape ? kTextHeight : kTextWidth)) return setting;
   }
   return std::nullopt;
 }
@@ -487,15 +465,15 @@ std::string ToLatex(const Table& table) {
   const std::string title = table.title.empty() ? "Records" : table.title;
   std::size_t number = 0;
   if (setting.landscape) out += "\\begin{landscape}\n";
-  for (const RowGroup& group : Groups(table)) {
-    const std::string caption = title + (group.heading.empty() ? "" : ": " + group.heading);
+  for (const auto& [heading, rows] : Groups(table)) {
+    const std::string caption = title + (heading.empty() ? "" : ": " + heading);
     out += fmt::format(
         "{{{}\\setlength{{\\tabcolsep}}{{{}pt}}\n\\begin{{longtable}}{{{}}}\n"
         "\\caption{{{}}}\\label{{{}}} \\\\\n\\toprule\n{}\\midrule\n\\endfirsthead\n"
         "\\toprule\n{}\\midrule\n\\endhead\n\\bottomrule\n\\endfoot\n",
         setting.size, setting.gap_pt, Preamble(shown, setting), BreakableLatex(caption),
         Label(table, number++), head, head);
-    for (const Record& row : group.rows) {
+    for (const Record& row : rows) {
       out += LatexRow(Mapped<std::string>(
           shown, [&row](const LatexColumn& one) { return LatexCell(row, one); }));
     }

@@ -16,12 +16,16 @@ namespace loopbench::harness {
 namespace {
 
 using std::string_view;
+using enum Format;
+
+std::string InUnit(const std::string& words, string_view unit) {
+  return unit.empty() ? words : fmt::format("{} [{}]", words, unit);
+}
 
 TableColumn Of(const Measure& measure, string_view key) {
   const auto& [words, unit, format] = measure.heading;
   const string_view shown = words == "*" ? key.substr(measure.key.size() - 1) : words;
-  const std::string brackets = unit.empty() ? "" : fmt::format(" [{}]", unit);
-  return {std::string(key), std::string(shown) + brackets, format, {}};
+  return {std::string(key), InUnit(std::string(shown), unit), format};
 }
 
 /// Columns of narrow tables with another heading, and shorter words for values. Others have their
@@ -74,28 +78,11 @@ TableColumn CompactColumn(string_view word) {
   return column;
 }
 
-/// Returns columns of measures that a program has added and that have words.
-std::vector<TableColumn> AddedColumns() {
-  std::vector<TableColumn> columns;
-  for (const Measure* measure : AddedMeasures()) {
-    const bool single = measure->type != ValueType::kNumbers && !measure->key.ends_with('*');
-    if (single && !measure->heading.words.empty()) columns.push_back(Of(*measure, measure->key));
-  }
-  return columns;
-}
-
 constexpr string_view kCase =
     "experiment mechanism formulation enforcement coordinates solver integrator rtol atol horizon "
     "outcome t_reached";
 constexpr string_view kCompactCase =
     "mechanism formulation enforcement coordinates solver rtol horizon outcome";
-
-using enum Format;
-
-// Returns true for keys of per-loop and per-body values, which are no parameters.
-bool IsFamily(const std::string& key) {
-  return key.starts_with("series.") || key.starts_with("drift.loop.");
-}
 
 // Returns true if tables contain this exact key, not only its family. A fixed step is a key only of
 // cases that have one, like a parameter: no table always has its column.
@@ -105,14 +92,13 @@ bool HasColumn(const std::string& key) {
   return measure != nullptr && measure->key == key && !measure->heading.words.empty();
 }
 
-// Returns the format of a value without a column of its own, by its type.
 Format FormatOf(const std::string& key, std::span<const Record> rows) {
   for (const Record& row : rows) {
     const Value* value = row.Find(key);
     if (value == nullptr || std::holds_alternative<std::monostate>(*value)) continue;
-    if (std::holds_alternative<std::int64_t>(*value)) return kInteger;
-    if (std::holds_alternative<double>(*value)) return kShortest;
-    return kText;
+    return std::holds_alternative<std::int64_t>(*value) ? kInteger
+           : std::holds_alternative<double>(*value)     ? kShortest
+                                                        : kText;
   }
   return kText;
 }
@@ -215,10 +201,13 @@ std::vector<TableColumn> ColumnsOfKind(string_view name, bool compact) {
   std::vector<TableColumn> columns;
   for (const auto part : std::views::split(words, ' ')) {
     const string_view word(part.begin(), part.end());
-    if (word == "ADDED") {
-      for (TableColumn& column : AddedColumns()) columns.push_back(std::move(column));
-    } else {
+    if (word != "ADDED") {
       columns.push_back(compact ? CompactColumn(word) : Of(*FindMeasure(word), word));
+      continue;
+    }
+    for (const Measure* measure : AddedMeasures()) {
+      const bool single = measure->type != ValueType::kNumbers && !measure->key.ends_with('*');
+      if (single && !measure->heading.words.empty()) columns.push_back(Of(*measure, measure->key));
     }
   }
   return columns;
@@ -237,11 +226,13 @@ std::optional<TableColumn> CompactCaseColumn(string_view key) {
   return std::nullopt;
 }
 
-// Columns for arbitrary record keys.
-
 TableColumn ColumnOf(const std::string& key, std::span<const Record> rows) {
-  if (std::optional<TableColumn> known = KnownColumn(key)) return *std::move(known);
-  return {.key = key, .header = key, .format = FormatOf(key, rows), .abbreviations = {}};
+  return KnownColumn(key).value_or(TableColumn{key, key, FormatOf(key, rows)});
+}
+
+std::vector<TableColumn> ColumnsOf(const std::vector<std::string>& keys,
+                                   std::span<const Record> rows) {
+  return Mapped<TableColumn>(keys, [&](const std::string& key) { return ColumnOf(key, rows); });
 }
 
 std::string UnitOf(const TableColumn& column) {
@@ -251,8 +242,23 @@ std::string UnitOf(const TableColumn& column) {
 }
 
 std::string WithUnit(const std::string& words, const std::string& key) {
-  const std::string unit = UnitOf(ColumnOf(key, {}));
-  return unit.empty() ? words : fmt::format("{} [{}]", words, unit);
+  return InUnit(words, UnitOf(ColumnOf(key, {})));
+}
+
+std::string NameBy(const Record& record, const std::vector<std::string>& keys,
+                   string_view separator) {
+  return Joined(keys, separator, [&](const std::string& key) {
+    const Value* value = record.Find(key);
+    const bool is_text = value != nullptr && std::holds_alternative<std::string>(*value);
+    return (is_text ? "" : key + " ") + record.Text(key);
+  });
+}
+
+std::string FirstOf(std::span<const std::string> texts, std::size_t most, string_view separator,
+                    string_view more) {
+  const std::string text = Joined(texts | std::views::take(most), separator);
+  if (texts.size() <= most) return text;
+  return text + fmt::format(fmt::runtime(more), texts.size() - most);
 }
 
 std::vector<std::string> KeysOf(std::span<const Record> rows) {
@@ -279,6 +285,14 @@ bool IsAlike(std::span<const Record> rows, const std::string& key) {
       rows, [&](const Record& row) { return row.Text(key) == rows.front().Text(key); });
 }
 
+std::vector<std::string> DistinguishingKeys(std::span<const Record> rows) {
+  std::vector<std::string> keys = CaseKeysOf(rows);
+  std::erase_if(keys, [&](const std::string& key) {
+    return (key == "atol" && AtolFollowsRtol(rows)) || IsAlike(rows, key);
+  });
+  return keys;
+}
+
 bool AtolFollowsRtol(std::span<const Record> rows) {
   return std::ranges::all_of(
       rows, [](const Record& row) { return row.Text("atol") == row.Text("rtol"); });
@@ -290,8 +304,10 @@ void RequireKey(const std::string& option, const std::string& key, std::span<con
   if (Contains(keys, key) || HasColumn(key)) return;
   const std::string nearest = NearestSpelling(key, keys);
   const std::string cure = nearest.empty() ? "" : fmt::format(" (did you mean \"{}\"?)", nearest);
-  std::vector<std::string> scalars = keys;
-  std::erase_if(scalars, IsFamily);
+  std::vector<std::string> scalars = keys;  // without values of each loop and body
+  std::erase_if(scalars, [](const std::string& one) {
+    return one.starts_with("series.") || one.starts_with("drift.loop.");
+  });
   throw ConfigError(fmt::format("{}: found \"{}\", which no record has{}; expected one of {}",
                                 option, key, cure, fmt::join(scalars, ", ")));
 }
@@ -300,9 +316,7 @@ void RequireConditions(const std::string& option, const Selection& selection,
                        std::span<const Record> rows) {
   for (const Condition& condition : selection) {
     RequireKey(option, condition.key, rows);
-    if (condition.op == Operator::kEqual || condition.op == Operator::kUnequal) {
-      continue;
-    }
+    if (condition.op == Operator::kEqual || condition.op == Operator::kUnequal) continue;
     std::string text;  // text of a record instead of a number
     const bool has_number = std::ranges::any_of(rows, [&](const Record& row) {
       if (text.empty()) text = row.Text(condition.key);
@@ -316,37 +330,40 @@ void RequireConditions(const std::string& option, const Selection& selection,
   }
 }
 
+std::vector<std::string> ParametersOf(std::span<const Record> rows) {
+  std::vector<std::string> keys = CaseKeysOf(rows);
+  std::erase_if(keys, HasColumn);
+  return keys;
+}
+
 std::vector<TableColumn> WithParameters(std::vector<TableColumn> columns,
                                         std::span<const Record> rows) {
-  for (const std::string& key : CaseKeysOf(rows)) {
-    if (!HasColumn(key)) InsertBeforeOutcome(&columns, ColumnOf(key, rows));
+  for (TableColumn& column : ColumnsOf(ParametersOf(rows), rows)) {
+    InsertBeforeOutcome(&columns, std::move(column));
   }
   return columns;
 }
 
 std::vector<TableColumn> TellingApart(std::vector<TableColumn> columns,
                                       std::span<const Record> rows) {
-  std::vector<std::string> looks(rows.size());
+  std::vector<std::string> looks(rows.size()), hidden;
   const auto show = [&](const std::string& key) {
     for (std::size_t i = 0; i < rows.size(); ++i) looks[i] += rows[i].Text(key) + '\n';
   };
-  const std::vector<std::string> keys = CaseKeysOf(rows);
-  const auto is_shown = [&](const std::string& key) {
-    return Contains(columns, key, &TableColumn::key);
-  };
-  for (const std::string& key : keys) {
-    if (is_shown(key)) show(key);
+  for (const std::string& key : CaseKeysOf(rows)) {
+    if (Contains(columns, key, &TableColumn::key)) {
+      show(key);
+    } else {
+      hidden.push_back(key);
+    }
   }
-  for (const std::string& key : keys) {
-    if (is_shown(key)) continue;
+  for (const std::string& key : hidden) {
     std::map<std::string, std::string> values;  // of the first row with this appearance
-    const bool tells = [&] {
-      for (std::size_t i = 0; i < rows.size(); ++i) {
-        const auto [first, is_new] = values.try_emplace(looks[i], rows[i].Text(key));
-        if (!is_new && first->second != rows[i].Text(key)) return true;
-      }
-      return false;
-    }();
+    bool tells = false;
+    for (std::size_t i = 0; i < rows.size() && !tells; ++i) {
+      const std::string value = rows[i].Text(key);
+      tells = values.try_emplace(looks[i], value).first->second != value;
+    }
     if (!tells) continue;
     InsertBeforeOutcome(&columns, CompactCaseColumn(key).value_or(ColumnOf(key, rows)));
     show(key);

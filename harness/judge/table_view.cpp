@@ -7,7 +7,6 @@
 #include <limits>
 #include <map>
 #include <numeric>
-#include <optional>
 #include <ranges>
 #include <tuple>
 
@@ -24,8 +23,7 @@ namespace {
 // Identity of a run at fixed tolerance and horizon. "geometry" is "square", "general" or, for a
 // problem without counterpart, empty; "family" is then the problem's own name.
 using Key = std::map<std::string, std::string>;
-
-using Run = std::pair<const Key, Record>;
+using Runs = std::map<Key, Record>;
 
 void SetProblem(const std::string& mechanism, Key* key) {
   (*key)["family"] = mechanism;
@@ -50,9 +48,12 @@ void RequireSameCase(const Record& one, const Record& other) {
   }
 }
 
-std::vector<Run> Collect(std::span<const Record> records, double rtol, double horizon) {
-  const std::vector<TableColumn> parameters = WithParameters({}, records);
-  std::map<Key, Record> last;
+Runs Collect(std::span<const Record> records, double rtol, double horizon) {
+  std::vector<std::string> parameters = ParametersOf(records);
+  // mechanisms differ in content and are still compared
+  std::erase_if(parameters,
+                [](const std::string& key) { return key == "config_hash" || key == "set"; });
+  Runs last;
   for (const Record& record : records) {
     if (record.Number("rtol") != rtol || record.Number("horizon") != horizon) continue;
     // timing has no drift; a run that failed before its first step has only an outcome
@@ -61,17 +62,13 @@ std::vector<Run> Collect(std::span<const Record> records, double rtol, double ho
     for (const char* name : {"formulation", "enforcement", "coordinates", "solver", "integrator"}) {
       key[name] = record.Text(name);
     }
-    for (const TableColumn& parameter : parameters) {
-      // mechanisms differ in content and are still compared
-      if (parameter.key == "config_hash" || parameter.key == "set") continue;
-      key["parameter " + parameter.key] = record.Text(parameter.key);
-    }
+    for (const std::string& name : parameters) key["parameter " + name] = record.Text(name);
     SetProblem(record.Text("mechanism"), &key);
     const auto [known, is_new] = last.try_emplace(key, record);
     if (!is_new) RequireSameCase(known->second, record);
     known->second = record;
   }
-  return {last.begin(), last.end()};
+  return last;
 }
 
 double Drift(const Record& record) {
@@ -103,13 +100,13 @@ std::vector<Change> Changes() {
 using Pairs = std::vector<std::pair<const Record*, const Record*>>;
 
 /// Returns the pairs of one change by setting of the splitting factor; "all" contains every pair.
-std::map<std::string, Pairs> PairsOf(const Change& change, const std::vector<Run>& runs) {
+std::map<std::string, Pairs> PairsOf(const Change& change, const Runs& runs) {
   std::map<std::string, Pairs> pairs;
   for (const auto& [key, record] : runs) {
     if (key.at(change.factor) != change.from) continue;
     Key wanted = key;
     wanted[change.factor] = change.to;
-    const auto to = std::ranges::find(runs, wanted, &Run::first);
+    const auto to = runs.find(wanted);
     if (to == runs.end()) continue;
     pairs["all"].emplace_back(&record, &to->second);
     const std::string& setting = key.at(change.split_by);
@@ -157,7 +154,7 @@ Table FactorialTable(std::span<const Record> records, double rtol, double horizo
       "factor, from, to, within, pairs:integer, ratio_mean=drift ratio:scientific, "
       "ratio_min=least:scientific, ratio_max=largest:scientific, "
       "exponent_difference=exponent diff.:exponent, left_out=left out:integer");
-  const std::vector<Run> runs = Collect(records, rtol, horizon);
+  const Runs runs = Collect(records, rtol, horizon);
   for (const Change& change : Changes()) {
     for (const auto& [within, pairs] : PairsOf(change, runs)) {
       table.rows.push_back(EffectOf(change, within, pairs));
@@ -169,10 +166,9 @@ Table FactorialTable(std::span<const Record> records, double rtol, double horizo
 bool IsReferenceRung(const Record& record) { return record.Text("integrator") == "gragg"; }
 
 std::string LadderOf(const Record& record) {
-  std::string text;
-  for (const char* key : kLadderKeys) text += record.Text(key) + '\n';
-  for (const TableColumn& parameter : WithParameters({}, {&record, 1})) {
-    text += fmt::format("{} {}\n", parameter.key, record.Text(parameter.key));
+  std::string text = ValuesOf(record, kLadderKeys);
+  for (const std::string& key : ParametersOf({&record, 1})) {
+    text += fmt::format("{} {}\n", key, record.Text(key));
   }
   return text;
 }
@@ -189,7 +185,6 @@ void SortSweepLevels(std::vector<Record>* records) {
 
 namespace {
 
-/// Meaning of error, drift and dominant error.
 const std::vector<std::string> kPrecisionNotes = {
     "error: largest distance of a centre of mass from the reference at the end; the reference "
     "(integrator gragg) is the same for all columns: multipliers in joint coordinates without "
@@ -200,11 +195,6 @@ const std::vector<std::string> kPrecisionNotes = {
     "more than a factor of two, else truncation (of the method, or by regularization); of the "
     "widest, truncation where the number is more than ten times the next narrower's scaled by the "
     "ratio of their eps"};
-
-bool HasKind(std::span<const Record> records, std::string_view kind) {
-  return std::ranges::any_of(records,
-                             [&](const Record& record) { return record.Text("kind") == kind; });
-}
 
 /// Returns nullptr for `factorial` and `all`.
 const KindOfTable* FindKind(std::string_view name) {
@@ -220,59 +210,42 @@ void RequireKeys(const TableView& view, std::span<const Record> rows) {
   for (const std::string& key : view.columns) RequireKey("--columns", key, rows);
 }
 
-// Returns every record key except series; keys in all records come in the records' order.
-std::vector<TableColumn> AllColumns(std::span<const Record> rows) {
-  std::vector<TableColumn> columns;
-  for (const std::string& key : KeysOf(rows)) {
-    if (!key.starts_with("series.")) columns.push_back(ColumnOf(key, rows));
-  }
-  return columns;
-}
-
+// "all": every key except series; keys in all records come in the records' order.
 std::vector<TableColumn> DefaultColumns(const std::string& kind, bool compact,
                                         std::span<const Record> rows) {
-  if (kind == "all") return AllColumns(rows);
+  if (kind == "all") {
+    std::vector<std::string> keys = KeysOf(rows);
+    std::erase_if(keys, [](const std::string& key) { return key.starts_with("series."); });
+    return ColumnsOf(keys, rows);
+  }
   std::vector<TableColumn> columns = WithParameters(ColumnsOfKind(kind, compact), rows);
   return compact ? TellingApart(std::move(columns), rows) : columns;
-}
-
-std::vector<TableColumn> ChosenColumns(const TableView& view, std::span<const Record> rows) {
-  return Mapped<TableColumn>(view.columns,
-                             [&](const std::string& key) { return ColumnOf(key, rows); });
 }
 
 bool Shows(const Table& table, const std::string& key) {
   return table.group == key || Contains(table.columns, key, &TableColumn::key);
 }
 
-// Returns a note on warnings without a column; `runs` are the sources of the table's rows.
-std::optional<std::string> HiddenWarnings(const Table& table, std::span<const Record> runs) {
-  const auto flagged =
-      std::ranges::count_if(runs, [](const Record& run) { return IsFlagged(run, "outcome"); });
-  if (flagged == 0 || Shows(table, "warnings")) return std::nullopt;
-  return fmt::format("{} of {} runs finished with warnings; see column warnings", flagged,
-                     runs.size());
-}
-
-// Returns notes for unreliable values if the chosen columns do not show this.
 std::vector<std::string> WhatColumnsHide(const Table& table) {
   std::vector<std::string> notes;
+  const std::size_t runs = table.rows.size();
   const auto failed = std::ranges::count_if(table.rows, HasFailed);
   if (failed > 0 && !Shows(table, "outcome")) {
-    notes.push_back(
-        fmt::format("{} of {} runs did not finish; see column outcome", failed, table.rows.size()));
+    notes.push_back(fmt::format("{} of {} runs did not finish; see column outcome", failed, runs));
   }
-  const bool shows_errors = std::ranges::any_of(
-      table.columns, [](const TableColumn& column) { return column.key.starts_with("error_"); });
+  const auto has_column = [&table](const auto& is) {
+    return std::ranges::any_of(table.columns, is);
+  };
   const auto within = std::ranges::count_if(
       table.rows, [](const Record& row) { return row.Number("error_over_uncertainty") <= 1.0; });
-  if (shows_errors && within > 0) {
+  if (within > 0 &&
+      has_column([](const TableColumn& column) { return column.key.starts_with("error_"); })) {
     notes.push_back(fmt::format(
         "{} of {} runs are as near to a published series as that is accurate: it cannot "
         "distinguish them from the truth (column error_over_uncertainty, at most 1)",
-        within, table.rows.size()));
+        within, runs));
   }
-  const bool unresolved = std::ranges::any_of(table.columns, [&](const TableColumn& column) {
+  const bool unresolved = has_column([&](const TableColumn& column) {
     const bool is_law = column.key.starts_with("growth_hypothesis");
     return column.key != "outcome" &&
            !Shows(table, is_law ? "growth_hypothesis_resolved" : "growth_resolved") &&
@@ -282,10 +255,29 @@ std::vector<std::string> WhatColumnsHide(const Table& table) {
   if (unresolved) {
     notes.push_back(
         "p is the exponent of growth; ? = not resolved (a single run, or windows disagree), as in "
-        "the "
-        "columns growth_resolved and growth_hypothesis_resolved");
+        "the columns growth_resolved and growth_hypothesis_resolved");
   }
   return notes;
+}
+
+std::size_t CountFlagged(std::span<const Record> rows) {
+  return static_cast<std::size_t>(
+      std::ranges::count_if(rows, [](const Record& row) { return IsFlagged(row, "outcome"); }));
+}
+
+/// Marks flagged rows in the title, and in the first column if the outcome is hidden.
+void MarkFlagged(bool has_reasons_below, Table* table) {
+  const std::size_t flagged = CountFlagged(table->rows);
+  if (flagged == 0 || table->title.empty()) return;
+  const bool shows_outcome = Shows(*table, "outcome");
+  const auto first = std::ranges::find_if(
+      table->columns, [&](const TableColumn& column) { return column.key != table->group; });
+  if (!shows_outcome && first != table->columns.end()) first->marks_warnings = true;
+  table->title += fmt::format(" - {} of {} rows are flagged (marked {}, {})", flagged,
+                              table->rows.size(), shows_outcome ? "? in outcome" : "*",
+                              has_reasons_below           ? "reasons below"
+                              : Shows(*table, "warnings") ? "reasons in column warnings"
+                                                          : "column warnings has the reasons");
 }
 
 /// Returns the table at the tolerance and horizon of the first record with a tolerance.
@@ -302,7 +294,10 @@ Table Factorial(const std::vector<Record>& rows) {
 std::string KindOf(const TableView& view, std::span<const Record> records) {
   if (!view.kind.empty()) return view.kind;
   for (const KindOfTable& kind : KindsOfTables()) {
-    if (HasKind(records, kind.records)) return std::string(kind.name);
+    const auto is_of_kind = [&](const Record& record) {
+      return record.Text("kind") == kind.records;
+    };
+    if (std::ranges::any_of(records, is_of_kind)) return std::string(kind.name);
   }
   return "all";
 }
@@ -325,46 +320,32 @@ Table MakeTable(std::span<const Record> records, const TableView& view) {
   RequireConditions("--where", view.where, records);
   const std::string kind = KindOf(view, records);
   std::vector<Record> rows = RowsOf(records, view);
+  const std::size_t runs = rows.size(), flagged = CountFlagged(rows);
   Table table;
   if (kind == "factorial") {
     table = Factorial(rows);
     RequireKeys(view, table.rows);
-    if (!view.columns.empty()) table.columns = ChosenColumns(view, table.rows);
+    if (!view.columns.empty()) table.columns = ColumnsOf(view.columns, table.rows);
   } else {
     RequireKeys(view, records);
     const KindOfTable* known = FindKind(kind);
     table.title = known == nullptr ? "Records" : known->title;
-    table.columns =
-        view.columns.empty() ? DefaultColumns(kind, view.compact, rows) : ChosenColumns(view, rows);
-    table.notes = NoiseWarnings(rows);
-    if (kind == "precision") table.notes = kPrecisionNotes;
+    table.columns = view.columns.empty() ? DefaultColumns(kind, view.compact, rows)
+                                         : ColumnsOf(view.columns, rows);
+    table.notes = kind == "precision" ? kPrecisionNotes : NoiseWarnings(rows);
     table.rows = std::move(rows);
   }
   table.group = view.group;
   if (!view.sort.empty()) SortRowsBy(&table.rows, view.sort, view.descending);
   if (!view.group.empty()) SortRowsBy(&table.rows, view.group, false);
-  const auto add_notes = [&table](std::vector<std::string> notes) {
-    std::ranges::move(notes, std::back_inserter(table.notes));
-  };
-  add_notes(WhatColumnsHide(table));
+  table.AddNotes(WhatColumnsHide(table));
   if (view.compact) {
-    add_notes(WarningNotes(table.rows, records));
-  } else if (const auto note = HiddenWarnings(table, kind == "factorial" ? rows : table.rows)) {
-    table.notes.push_back(*note);
+    table.AddNotes(WarningNotes(table.rows, records));
+  } else if (flagged > 0 && !Shows(table, "warnings")) {
+    table.notes.push_back(
+        fmt::format("{} of {} runs finished with warnings; see column warnings", flagged, runs));
   }
-  const auto flagged = std::ranges::count_if(
-      table.rows, [](const Record& row) { return IsFlagged(row, "outcome"); });
-  if (flagged > 0 && !table.title.empty()) {
-    const bool shows_outcome = Shows(table, "outcome");
-    const auto first = std::ranges::find_if(
-        table.columns, [&](const TableColumn& column) { return column.key != table.group; });
-    if (!shows_outcome && first != table.columns.end()) first->marks_warnings = true;
-    table.title += fmt::format(" - {} of {} rows are flagged (marked {}, {})", flagged,
-                               table.rows.size(), shows_outcome ? "? in outcome" : "*",
-                               view.compact               ? "reasons below"
-                               : Shows(table, "warnings") ? "reasons in column warnings"
-                                                          : "column warnings has the reasons");
-  }
+  MarkFlagged(view.compact, &table);
   return table;
 }
 
@@ -404,8 +385,6 @@ std::vector<std::string> NoiseWarnings(std::span<const Record> rows) {
                       std::ceil(100 * least))};
 }
 
-// Notes on warnings.
-
 namespace {
 
 constexpr std::size_t kRowsNamed = 3, kProblemsNamed = 6;
@@ -418,25 +397,23 @@ std::string NoteOf(const WarningRow& warning, std::span<const Record> rows,
     names.push_back(fmt::format("{} ({})", NameOfRow(row, keys), warning.number(row)));
   }
   if (names.empty()) return "";
-  const std::size_t more = names.size() - std::min(names.size(), kRowsNamed);
-  return fmt::format("{}: {}: {}{}", warning.code, warning.sentence,
-                     Joined(names | std::views::take(kRowsNamed), "; "),
-                     more > 0 ? fmt::format("; and {} more", more) : "");
+  return fmt::format("{}: {}: {}", warning.code, warning.sentence,
+                     FirstOf(names, kRowsNamed, "; ", "; and {} more"));
 }
 
 // Runs of one problem, horizon and tolerance.
-using ProblemKey = std::pair<std::string, std::pair<double, double>>;
+using ProblemKey = std::tuple<std::string, double, double>;
 
 ProblemKey ProblemOf(const Record& record) {
-  return {record.Text("problem_id"), {record.Number("horizon"), record.Number("rtol")}};
+  return {record.Text("problem_id"), record.Number("horizon"), record.Number("rtol")};
 }
 
 /// Returns a name with the parameters in which the store's `records` differ.
 std::string NameOfProblem(const Record& record, std::span<const Record> records) {
   std::vector<std::string> keys = {"rtol", "horizon"};
   const std::vector<std::string> telling = DistinguishingKeys(records);
-  for (const TableColumn& parameter : WithParameters({}, records)) {
-    if (Contains(telling, parameter.key)) keys.push_back(parameter.key);
+  for (const std::string& key : ParametersOf(records)) {
+    if (Contains(telling, key)) keys.push_back(key);
   }
   return fmt::format("{}: {} {}", kDisagreementWarning, record.Text("mechanism"),
                      NameOfRow(record, keys));
@@ -449,10 +426,9 @@ std::string NoteOfProblem(const std::vector<Record>& runs, std::span<const Recor
                                    ? "finer tolerances"
                                    : "finer tolerances or an integrator all of whose runs agree";
   const std::vector<std::string> keys = DistinguishingKeys(runs);
-  std::map<std::int64_t, std::vector<Record>> clusters;
-  for (const Record& run : runs) {
-    clusters[static_cast<std::int64_t>(run.Number("agreement"))].push_back(run);
-  }
+  auto clusters = GroupBy(
+      runs, [](const Record& run) { return static_cast<std::int64_t>(run.Number("agreement")); });
+  std::ranges::sort(clusters, {}, [](const auto& cluster) { return cluster.first; });
   std::string text, alone;
   for (const auto& [number, members] : clusters) {
     const std::string names =
@@ -475,15 +451,6 @@ std::string NoteOfProblem(const std::vector<Record>& runs, std::span<const Recor
 }
 
 }  // namespace
-
-std::vector<std::string> DistinguishingKeys(std::span<const Record> rows) {
-  std::vector<std::string> keys;
-  for (const std::string& key : CaseKeysOf(rows)) {
-    if (key == "atol" && AtolFollowsRtol(rows)) continue;
-    if (!IsAlike(rows, key)) keys.push_back(key);
-  }
-  return keys;
-}
 
 std::string NameOfRow(const Record& row, const std::vector<std::string>& keys) {
   std::string words, numbers;
@@ -516,20 +483,19 @@ std::vector<std::string> WarningNotes(std::span<const Record> rows,
   for (const WarningRow& row : WarningRows()) {
     if (const std::string note = NoteOf(row, rows, keys); !note.empty()) notes.push_back(note);
   }
-  std::vector<ProblemKey> problems;
-  for (const Record& row : rows) {
-    if (HasWarning(row, kDisagreementWarning)) AddOnce(problems, ProblemOf(row));
-  }
-  for (const ProblemKey& problem : problems | std::views::take(kProblemsNamed)) {
+  std::vector<Record> disagreeing;
+  std::ranges::copy_if(rows, std::back_inserter(disagreeing),
+                       [](const Record& row) { return HasWarning(row, kDisagreementWarning); });
+  const auto problems = GroupBy(disagreeing, ProblemOf);
+  for (const auto& [problem, flagged] : problems | std::views::take(kProblemsNamed)) {
     std::vector<Record> runs;
     std::ranges::copy_if(records, std::back_inserter(runs), [&](const Record& record) {
       return record.Find("agreement") != nullptr && ProblemOf(record) == problem;
     });
     // no other run at this tolerance: no cluster
-    notes.push_back(runs.empty()
-                        ? NameOfProblem(*std::ranges::find(rows, problem, ProblemOf), records) +
-                              ": another final state than with finer tolerances"
-                        : NoteOfProblem(runs, records));
+    notes.push_back(runs.empty() ? NameOfProblem(flagged.front(), records) +
+                                       ": another final state than with finer tolerances"
+                                 : NoteOfProblem(runs, records));
   }
   if (problems.size() > kProblemsNamed) {
     notes.push_back(fmt::format("{}: {} problems more; column agreement numbers the agreeing sets",

@@ -1,9 +1,11 @@
-// Tables: their columns and rows, formats, views of records, notes.
+// Records by keys and groups, statistics of samples, and tables: columns, rows, formats, notes.
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <initializer_list>
+#include <map>
 #include <optional>
 #include <span>
 #include <string>
@@ -16,6 +18,103 @@
 #include "harness/base/text.h"
 
 namespace loopbench::harness {
+
+// Keys and groups.
+
+/// Groups items by `key_of` (a function or a member): pairs of key and items, in order of first
+/// appearance.
+template <class List, class KeyOf>
+auto GroupBy(const List& items, const KeyOf& key_of) {
+  using Item = std::remove_cvref_t<decltype(*std::begin(items))>;
+  using Key = std::remove_cvref_t<std::invoke_result_t<KeyOf, const Item&>>;
+  std::vector<std::pair<Key, std::vector<Item>>> groups;
+  std::map<Key, std::size_t> places;
+  for (const Item& item : items) {
+    const auto [place, is_new] = places.try_emplace(std::invoke(key_of, item), groups.size());
+    if (is_new) groups.emplace_back(place->first, std::vector<Item>());
+    groups[place->second].second.push_back(item);
+  }
+  return groups;
+}
+
+/// Returns the values of these keys, one per line: the key of a group.
+template <class Keys>
+std::string ValuesOf(const Record& record, const Keys& keys) {
+  return Joined(keys, "", [&](const auto& key) { return record.Text(key) + '\n'; });
+}
+
+/// Returns "odca, rtol 1e-08": texts unchanged, which are clear without a key, numbers with theirs.
+std::string NameBy(const Record& record, const std::vector<std::string>& keys,
+                   std::string_view separator);
+
+/// Returns the first `most` texts; `more` has the number of the others: " and {} more".
+std::string FirstOf(std::span<const std::string> texts, std::size_t most,
+                    std::string_view separator, std::string_view more);
+
+/// Returns the keys that identify cases: those before "case_id" or "outcome", each once.
+std::vector<std::string> CaseKeysOf(std::span<const Record> rows);
+
+/// Returns all keys of the records, each once, in order of first appearance.
+std::vector<std::string> KeysOf(std::span<const Record> rows);
+
+/// Returns true if all rows have the same text under the key.
+bool IsAlike(std::span<const Record> rows, const std::string& key);
+
+/// Returns the case keys in which rows differ. Absolute tolerances go with relative ones.
+std::vector<std::string> DistinguishingKeys(std::span<const Record> rows);
+
+/// Returns true if no row has an absolute tolerance of its own.
+bool AtolFollowsRtol(std::span<const Record> rows);
+
+/// Returns the keys of cases that no table has: parameters of a sweep.
+std::vector<std::string> ParametersOf(std::span<const Record> rows);
+
+/// Throws ConfigError, with `option`, the key, the nearest spelling and all keys, if neither a
+/// record nor a table has the key.
+void RequireKey(const std::string& option, const std::string& key, std::span<const Record> rows);
+
+/// Checks the keys of all conditions in this way. Also throws for an order condition on a key
+/// without a number in any record.
+void RequireConditions(const std::string& option, const Selection& selection,
+                       std::span<const Record> rows);
+
+/// True if the run of a row did not end with its expected outcome.
+bool HasFailed(const Record& row);
+
+// Statistics of samples.
+
+/// Returns the median; NaN for an empty sample or a sample with NaN.
+double Median(std::span<const double> sample);
+
+/// Result of the Mann-Whitney test of two independent samples.
+struct MannWhitneyResult {
+  double u = 0.0;        ///< number of pairs (a, b) with a > b; equal pairs count one half
+  double p_greater = 1;  ///< probability of at least this u under equal distributions
+  bool exact = false;    ///< p from the exact distribution, otherwise normal approximation
+};
+
+/// H1: values of `a` tend to be larger than those of `b` (H. B. Mann, D. R. Whitney, 1947). Exact
+/// without ties and up to 40 values in a sample; otherwise normal with corrections for ties and
+/// continuity. p = 1 when a sample is empty. The samples are finite numbers.
+MannWhitneyResult MannWhitney(std::span<const double> a, std::span<const double> b);
+
+/// Returns the smallest possible p_greater for these sample sizes.
+double SmallestP(std::size_t a, std::size_t b);
+
+/// Returns p-values adjusted by Holm's step-down method (S. Holm, 1979), in the given order.
+/// Rejecting values up to alpha keeps the probability of any false rejection below alpha, for any
+/// dependence.
+std::vector<double> HolmAdjusted(std::span<const double> p);
+
+/// Returns exponents of time over size, one row per family of right-hand sides. A family is a set
+/// of benchmarks whose names differ in one number ("rhs/chain/10/odca/...",
+/// "rhs/chain/30/odca/..."), or timings of equal methods with mechanisms "chain-10" and "chain-30".
+/// Sizes are numbers of bodies (counter "bodies"), or the numeric part without this counter. Keys:
+/// "family", "sizes", "bodies_min", "bodies_max", "exponent", "standard_error", "slope_min",
+/// "slope_max", "ns_per_body" at the largest size, "failed" (members of the family that ended with
+/// an error, of any size). Names without a numeric part and families with one member are left out;
+/// families with fewer than two measured sizes have no exponent. Sizes below `from` are ignored.
+std::vector<Record> FitFamilies(const std::vector<Record>& measured, double from);
 
 // One table, five writers: terminal text, CSV, Markdown, JSON and LaTeX. Each escapes texts with
 // the function of its medium in harness/base/text.h.
@@ -53,6 +152,11 @@ struct Table {
   std::string group = "";
   /// Colour of a cell on a terminal, as its SGR number ("31" is red), "" for none.
   std::string (*colour)(const Record& row, const TableColumn& column) = &OutcomeColour;
+
+  /// Appends further notes.
+  void AddNotes(const std::vector<std::string>& more) {
+    notes.insert(notes.end(), more.begin(), more.end());
+  }
 };
 
 /// Value of a cell: a text of any type, a number, a count, a word of an enumeration, or a value.
@@ -80,18 +184,6 @@ struct AnyValue {
 /// columns empty.
 Record& AddRow(std::initializer_list<AnyValue> values, Table* table);
 
-/// Rows with one value of the group's key, under "key = value".
-struct RowGroup {
-  std::string heading;
-  std::vector<Record> rows = {};
-};
-
-/// Returns the groups in order of first appearance; one without heading if the table is undivided.
-std::vector<RowGroup> Groups(const Table& table);
-
-/// True if the run of a row did not end with its expected outcome.
-bool HasFailed(const Record& row);
-
 /// True if the value of `key` is unreliable: the outcome of a finished run with `warnings`, or an
 /// unresolved exponent or law of growth. Exponents of energy and corrections come from one run,
 /// which resolves none.
@@ -107,8 +199,7 @@ std::string NumberCell(double number);
 
 /// Writes aligned text: title, heading, rule, rows, notes. Columns are as wide as their widest
 /// cell, two spaces apart, counted in cells of a terminal (harness/base/text.h). With `colour`
-/// cells have the table's colours; escape sequences have no width. FitWidth() fits tables to a
-/// terminal.
+/// cells have the table's colours; escape sequences have no width.
 std::string ToText(const Table& table, bool colour = false);
 
 /// Writes RFC 4180: a header of the column keys, then one line per row, quoted if necessary.
@@ -149,7 +240,7 @@ Table FitWidth(Table table, std::size_t width);
 /// (harness/base/text.h); for a file or a pipe the text of ToText().
 std::string ToScreen(const Table& table);
 
-// Columns of tables of records, and keys that distinguish records.
+// Columns of tables of records.
 
 /// Table of the records of one kind.
 struct KindOfTable {
@@ -177,36 +268,19 @@ std::optional<TableColumn> KnownColumn(std::string_view key);
 /// Column of any key: header, unit and format as in the tables if they contain it. Otherwise the
 /// key is the header, and the type of its first value in `rows` decides the format.
 TableColumn ColumnOf(const std::string& key, std::span<const Record> rows);
+/// Returns the columns of these keys.
+std::vector<TableColumn> ColumnsOf(const std::vector<std::string>& keys,
+                                   std::span<const Record> rows);
 
 /// Returns the unit in the brackets that end the header, "" without brackets.
 std::string UnitOf(const TableColumn& column);
 
 /// Returns the words with the unit of a key in brackets, if it has one: "error [m]".
 std::string WithUnit(const std::string& words, const std::string& key);
+inline std::string WithUnit(const std::string& key) { return WithUnit(key, key); }
 
-/// Returns the keys that identify cases: those before "case_id" or "outcome", each once.
-std::vector<std::string> CaseKeysOf(std::span<const Record> rows);
-
-/// Returns true if all rows have the same text under the key.
-bool IsAlike(std::span<const Record> rows, const std::string& key);
-
-/// Returns true if no row has an absolute tolerance of its own.
-bool AtolFollowsRtol(std::span<const Record> rows);
-
-/// Returns all keys of the records, each once, in order of first appearance.
-std::vector<std::string> KeysOf(std::span<const Record> rows);
-
-/// Throws ConfigError, with `option`, the key, the nearest spelling and all keys, if neither a
-/// record nor a table has the key.
-void RequireKey(const std::string& option, const std::string& key, std::span<const Record> rows);
-
-/// Checks the keys of all conditions in this way. Also throws for an order condition on a key
-/// without a number in any record.
-void RequireConditions(const std::string& option, const Selection& selection,
-                       std::span<const Record> rows);
-
-/// Returns `columns` with the keys of records that no table has (parameters of a sweep), before
-/// "outcome". Without them rows could not be distinguished.
+/// Returns `columns` with the parameters of the records before "outcome". Without them rows could
+/// not be distinguished.
 std::vector<TableColumn> WithParameters(std::vector<TableColumn> columns,
                                         std::span<const Record> rows);
 
@@ -277,12 +351,8 @@ std::string KindOf(const TableView& view, std::span<const Record> records);
 std::vector<Record> RowsOf(std::span<const Record> records, const TableView& view);
 
 /// Returns notes ("warning: ...") if timings among the rows come from a noisy machine: their
-/// number, the worst A/A spread, load and governor (thresholds: harness/base/record.h). No notes
-/// if all were quiet.
+/// number, the worst A/A spread, load and governor (thresholds: harness/base/record.h).
 std::vector<std::string> NoiseWarnings(std::span<const Record> rows);
-
-/// Returns the case keys in which rows differ. Absolute tolerances go with relative ones.
-std::vector<std::string> DistinguishingKeys(std::span<const Record> rows);
 
 /// Returns "odca/velocity/joint rtol 1e-08": texts unchanged, numbers with their key; the mechanism
 /// if `row` has none of `keys`.

@@ -1,39 +1,31 @@
+// Warnings about runs and about models.
 #include <fmt/format.h>
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
-#include <functional>
 #include <iterator>
 #include <limits>
-#include <map>
 #include <numbers>
 #include <optional>
-#include <set>
 #include <sstream>
 #include <string>
-#include <string_view>
-#include <utility>
+#include <vector>
 
 #include "harness/base/text.h"
 #include "harness/config/experiment.h"
 #include "harness/config/formulations.h"
 #include "harness/config/published_series.h"
 #include "harness/judge/analysis.h"
+#include "harness/judge/tables.h"
+#include "mechanism/loops/excursion.h"
 #include "mechanism/loops/scaled_loops.h"
+#include "mechanism/model/force_elements.h"
+#include "mechanism/model/kinematics.h"
+#include "mechanism/start/poses.h"
 
 namespace loopbench::harness {
-namespace {
 
-/// Final poses nearer than this, over links and in rad, are alike for rounding's sake: below 1e-11
-/// comparisons hold all errors for round-off (harness/judge/judge.h).
-constexpr double kRoundOffShare = 1e-11;
-
-constexpr std::string_view kPrefix = "series.final.";
-
-/// Runs of one problem, horizon and tolerance with equal final poses, by index, largest set first.
-using Clusters = std::vector<std::vector<std::size_t>>;
-
-/// Returns the largest of the relative and the absolute tolerances of a run; NaN without.
 double ToleranceOf(const Record& record) {
   double largest = record.Number("rtol");
   for (const char* key :
@@ -47,230 +39,26 @@ bool IsFinishedRun(const Record& record) {
   return record.Text("kind") == "accuracy" && record.Text("outcome") == "finished";
 }
 
-bool HasFinalPoses(const Record& record) {
-  return IsFinishedRun(record) && !record.Text("problem_id").empty() &&
-         !std::isnan(record.Number("rtol")) &&
-         std::ranges::any_of(record.items(),
-                             [](const auto& item) { return item.first.starts_with(kPrefix); });
-}
-
-const std::vector<double>* PoseOf(const std::string& key, const Value& value) {
-  return key.starts_with(kPrefix) ? std::get_if<std::vector<double>>(&value) : nullptr;
-}
-
-/// Returns the unit of component i of a pose: link length, or 1 rad.
-double UnitOf(double link_length, std::size_t size, std::size_t i) {
-  return i < (size == 3 ? 2u : 3u) ? link_length : 1.0;
-}
-
-bool IsSoft(const Record& record) {
-  const FormulationRow* row = FindFormulation(record.Text("formulation"));
-  return row != nullptr && row->is_soft;
-}
-
-/// Returns the runs for which `chooses` is true.
-template <class Choose>
-std::vector<std::size_t> Only(std::vector<std::size_t> runs, const Choose& chooses) {
-  std::erase_if(runs, std::not_fn(chooses));
-  return runs;
-}
-
-bool EndAlike(const Record& a, const Record& b, double rtol) {
-  return DifferenceOf(a, b).largest <= kMaxTolerances * rtol;
-}
-
-/// Final poses of a set of runs: of each component the least and the largest. A number that is not
-/// finite, or is not there, is as far as can be from all others.
-class Bounds {
- public:
-  /// Returns true if `run` has the final pose of each run in the cluster.
-  bool Fit(const Record& run, double rtol) const {
-    for (const auto& [key, value] : run.items()) {
-      const auto* pose = PoseOf(key, value);
-      if (pose == nullptr) continue;
-      const auto known = bounds_.find(key);
-      if (known == bounds_.end()) continue;  // simplified away there
-      const auto& [low, high] = known->second;
-      if (low.size() != pose->size()) return false;
-      for (std::size_t i = 0; i < pose->size(); ++i) {
-        const double off = std::max((*pose)[i] - low[i], high[i] - (*pose)[i]);
-        if (!(off / UnitOf(length_, pose->size(), i) <= kMaxTolerances * rtol)) return false;
-      }
-    }
-    return true;
-  }
-  void Take(const Record& run) {
-    if (length_ == 0.0) length_ = run.Number("link_length");
-    for (const auto& [key, value] : run.items()) {
-      const auto* pose = PoseOf(key, value);
-      if (pose == nullptr || pose->empty()) continue;
-      auto& [low, high] = bounds_.try_emplace(key, *pose, *pose).first->second;
-      if (low.size() != pose->size()) low[0] = -kFar, high[0] = kFar;
-      for (std::size_t i = 0; i < std::min(low.size(), pose->size()); ++i) {
-        const double number = (*pose)[i];
-        low[i] = std::isfinite(number) ? std::min(low[i], number) : -kFar;
-        high[i] = std::isfinite(number) ? std::max(high[i], number) : kFar;
-      }
-    }
-  }
-  PoseDifference Widest() const {
-    PoseDifference widest;
-    for (const auto& [key, bounds] : bounds_) {
-      const auto& [low, high] = bounds;
-      for (std::size_t i = 0; i < low.size(); ++i) {
-        double off = (high[i] - low[i]) / UnitOf(length_, low.size(), i);
-        if (std::isnan(off)) off = kFar;
-        if (off > widest.largest) widest = {off, key.substr(kPrefix.size())};
-      }
-    }
-    return widest;
-  }
-
- private:
-  static constexpr double kFar = std::numeric_limits<double>::infinity();
-  std::map<std::string, std::pair<std::vector<double>, std::vector<double>>> bounds_;
-  double length_ = 0.0;
-};
-
-Clusters ClustersOf(std::span<const Record> records, const std::vector<std::size_t>& runs,
-                    double rtol) {
-  Clusters clusters;
-  std::vector<Bounds> bounds;
-  for (const std::size_t run : runs) {
-    const auto place = std::ranges::find_if(
-        bounds, [&](const Bounds& cluster) { return cluster.Fit(records[run], rtol); });
-    const auto index = static_cast<std::size_t>(place - bounds.begin());
-    if (place == bounds.end()) {
-      clusters.emplace_back();
-      bounds.emplace_back();
-    }
-    clusters[index].push_back(run);
-    bounds[index].Take(records[run]);
-  }
-  std::ranges::stable_sort(clusters, std::greater<>(), &std::vector<std::size_t>::size);
-  return clusters;
-}
-
-/// Returns true if runs of different equations are all in one cluster.
-bool Decides(std::span<const Record> records, const Clusters& clusters) {
-  if (clusters.size() != 1) return false;
-  std::set<std::string> ways;
-  for (const std::size_t run : clusters.front()) {
-    ways.insert(records[run].Text("enforcement") + " " + records[run].Text("coordinates"));
-  }
-  return ways.size() > 1;
-}
-
-/// Returns true if the run's level restores the branch at every step.
-bool KeepsBranches(const Record& record) {
-  const auto level = FindLevel(record.Text("enforcement"));
-  return level && TraitsOf(*level).growth == DriftGrowth::kNone && !IsPeer(record);
-}
-
-/// Returns a run whose final pose decides for its tolerance: all runs of its integrator (and the
-/// external engines) agree. Null if none or if another integrator's runs agree elsewhere.
-const Record* DecidedBy(std::span<const Record> records, const std::vector<std::size_t>& runs,
-                        double rtol) {
-  std::set<std::string> integrators;
-  for (const std::size_t run : runs) {
-    if (!IsPeer(records[run])) integrators.insert(records[run].Text("integrator"));
-  }
-  const Record* decided = nullptr;
-  for (const std::string& integrator : integrators) {
-    const std::vector<std::size_t> own = Only(runs, [&](std::size_t run) {
-      return IsPeer(records[run]) || records[run].Text("integrator") == integrator;
-    });
-    if (!Decides(records, ClustersOf(records, own, rtol))) continue;
-    const Record* witness = &records[own.front()];
-    if (decided != nullptr && !EndAlike(*decided, *witness, rtol)) return nullptr;
-    if (decided == nullptr) decided = witness;
-  }
-  return decided;
-}
-
-}  // namespace
-
 bool IsPeer(const Record& record) {
   const FormulationRow* row = FindFormulation(record.Text("formulation"));
   return row != nullptr && row->is_peer();
 }
 
-PoseDifference LargestDifference(std::span<const Record> runs) {
-  Bounds bounds;
-  for (const Record& run : runs) bounds.Take(run);
-  return bounds.Widest();
-}
-
-PoseDifference DifferenceOf(const Record& a, const Record& b) {
-  Bounds bounds;
-  for (const Record* run : {&a, &b}) bounds.Take(*run);
-  return bounds.Widest();
-}
-
-std::vector<Agreement> CompareFinalPoses(std::span<const Record> records,
-                                         std::vector<bool> testifies) {
-  if (testifies.empty()) testifies.assign(records.size(), true);
-  // by problem and horizon, then by tolerance, the finest first
-  std::map<std::pair<std::string, double>, std::map<double, std::vector<std::size_t>>> problems;
-  for (std::size_t i = 0; i < records.size(); ++i) {
-    if (!HasFinalPoses(records[i])) continue;
-    problems[{records[i].Text("problem_id"), records[i].Number("horizon")}][ToleranceOf(records[i])]
-        .push_back(i);
-  }
-  std::vector<Agreement> agreements(records.size());
-  for (const auto& [problem, tolerances] : problems) {
-    const Record* decided = nullptr;
-    for (const auto& [rtol, all] : tolerances) {
-      const auto runs = Only(all, [&](std::size_t run) { return !IsSoft(records[run]); });
-      auto witnesses = Only(runs, [&](std::size_t run) { return testifies[run]; });
-      if (witnesses.empty()) witnesses = runs;
-      const Clusters clusters = ClustersOf(records, runs, rtol);
-      if (decided == nullptr) decided = DecidedBy(records, witnesses, rtol);
-      const Record* others = decided;  // those that do not give way, where they agree
-      if (others == nullptr && clusters.size() == 1) others = &records[clusters.front().front()];
-      for (std::size_t c = 0; c < clusters.size(); ++c) {
-        for (const std::size_t run : clusters[c]) {
-          if (all.size() > 1) agreements[run].cluster = static_cast<std::int64_t>(c) + 1;
-        }
-      }
-      for (const std::size_t run : all) {
-        if (runs.empty()) continue;
-        Agreement& agreement = agreements[run];
-        agreement.flagged = others == nullptr || !EndAlike(records[run], *others, rtol);
-        if (!IsSoft(records[run])) continue;
-        agreement.cluster = agreement.flagged ? static_cast<std::int64_t>(clusters.size()) + 1 : 1;
-      }
-      // a branch is kept by who ends as those do that can keep it
-      const bool is_kept = std::ranges::any_of(witnesses, [&](std::size_t run) {
-        return testifies[run] && KeepsBranches(records[run]) && !agreements[run].flagged;
-      });
-      for (const std::size_t run : runs) {
-        agreements[run].is_backed = is_kept && !agreements[run].flagged;
-      }
-    }
-  }
-  return agreements;
-}
-
 namespace {
 
-/// Energy balance: a hundredth of the energy that moves is no error of integration at any tolerance
-/// that deserves the name; regular runs at 1e-6 have 1e-3 and less.
+/// Largest error of the energy balance at any tolerance; regular runs at 1e-6 have 1e-3 and less.
 constexpr double kMaxEnergyError = 1e-2;
 /// Rounding of an evaluation, which adds to a tolerance.
 constexpr double kEvaluation = 100 * std::numeric_limits<double>::epsilon();
 
-/// Factors of n^2 and n in the promised drift. Over 20 s at 1e-6 and 1e-9 the regular shipped
-/// mechanisms stay below 0.004 and 0.03 (the crank-rocker driven at 3 rad/s has both), Bennett's
-/// linkage, whose drift grows exponentially with its redundant rows kept, reached 0.1 after 20 s
-/// and 0.2 to 30 after 50 s.
+/// Factors of n^2 and n in the promised drift. Regular shipped mechanisms stay below 0.004 and 0.03
+/// over 20 s; Bennett's linkage with its redundant rows kept reached 0.1, and 0.2 to 30 after 50 s.
 constexpr double kAcceleration = 0.02, kVelocity = 0.2;
 /// Few steps have more room: each may err by some tolerances.
 constexpr double kFewSteps = 10.0;
 /// Steps that Baumgarte's default gains, 0.05/h, remember: twice one over the gain.
 constexpr double kRemembered = 40.0;
-/// With fixed steps no tolerance bounds the errors. A loop-closure error of a tenth of a link
-/// counts as open for any step size; growth is not analysed beyond it either.
+/// A loop-closure error of a tenth of a link counts as open for any fixed step.
 constexpr double kOpenLoop = 0.1;
 /// Factor over the projection's tolerance for rounding in the evaluation; 15 was observed.
 constexpr double kProjection = 25.0;
@@ -284,7 +72,6 @@ constexpr double kStepFloor = 1e3 * 16 * std::numeric_limits<double>::epsilon();
 /// not smooth. Fewer than a dozen rejections are not significant.
 constexpr double kMaxRejected = 1.0, kFewRejected = 12.0;
 
-/// Step control at its floor, or failing all the time.
 bool StepControlFailing(const Record& record) {
   const double rejected = record.Number("rejected");
   if (rejected > kFewRejected && rejected > kMaxRejected * record.Number("steps")) return true;
@@ -373,7 +160,6 @@ bool IsNear(const Record& record, const char* error, const char* accuracy, doubl
   return record.Number(error) / length <= expected + certain;
 }
 
-/// Returns true if all known errors are small.
 bool IsNearReference(const Record& record) {
   const double link = record.Number("link_length");
   const auto has = [&](const char* key) { return record.Find(key) != nullptr; };
@@ -385,12 +171,14 @@ bool IsNearReference(const Record& record) {
   });
 }
 
-/// Returns true for agreement to the end of the run. Published data are sparse, so agreement with
-/// them does not prove the branch.
+}  // namespace
+
 bool IsCertified(const Record& record) {
   return record.Find("error_position_end") != nullptr && record.Text("reference") != kPublished &&
          IsNearReference(record);
 }
+
+namespace {
 
 /// Returns true if the finer run of the case differs by more than kMaxTolerances, or with fixed
 /// steps by more than kMaxFixedError.
@@ -430,13 +218,10 @@ double DriftShare(const Record& record) {
   return shift <= rotation || std::isnan(rotation) ? rotation : shift;
 }
 
-/// Returns the drift expected at the record's level (docs/theory/constraints-and-drift.md).
-///
-/// A step of tolerance rtol leaves errors of about rtol in positions and speeds. At velocity level
-/// position errors add up to n rtol. At acceleration level speed errors persist: n^2 rtol times the
-/// angle per step. Baumgarte feedback damps all but the last steps; projection leaves round-off,
-/// and some tolerance in regularized directions. Fixed steps have no expected drift except with
-/// projection.
+/// Returns the drift expected at the record's level (docs/theory/constraints-and-drift.md): after n
+/// steps n rtol at velocity level, n^2 rtol times the angle per step at acceleration level.
+/// Baumgarte feedback damps all but the last steps; projection leaves round-off, and some tolerance
+/// in regularized directions. Fixed steps have no expected drift except with projection.
 double ExpectedDriftShare(const Record& record) {
   const double tolerance = ToleranceOf(record);
   const double goal = kProjection * record.Number("position_goal") / record.Number("link_length");
@@ -530,6 +315,15 @@ const WarningRow kWarnings[] = {
      [](const Record& record) {
        return fmt::format("{:.2g} periods a step", PeriodsPerStep(record));
      }},
+    {kSpringWarning,
+     "a spring passes zero length, where its force has no direction and is not zero",
+     [](const Record& record) {
+       return record.Number("spring_reversals") > 0 && !IsCertified(record);
+     },
+     [](const Record& record) {
+       return fmt::format("{} at {:.4g} s", record.Text("spring_reversal"),
+                          record.Number("spring_reversal_t"));
+     }},
     {kStepsWarning, "step control at its shortest step, or more than half of the steps rejected",
      StepControlFailing,
      [](const Record& record) {
@@ -554,6 +348,10 @@ const WarningRow kWarnings[] = {
      }},
 };
 
+}  // namespace
+
+std::span<const WarningRow> WarningRows() { return kWarnings; }
+
 std::vector<std::string> OwnCodes(const Record& record) {
   std::vector<std::string> codes;
   for (const WarningRow& row : kWarnings) {
@@ -561,10 +359,6 @@ std::vector<std::string> OwnCodes(const Record& record) {
   }
   return codes;
 }
-
-}  // namespace
-
-std::span<const WarningRow> WarningRows() { return kWarnings; }
 
 std::optional<DriftGrowth> GrowthAt(const Record& record) {
   const auto level = FindLevel(record.Text("enforcement"));
@@ -574,97 +368,6 @@ std::optional<DriftGrowth> GrowthAt(const Record& record) {
 
 std::string OwnWarnings(const Record& record) { return Joined(OwnCodes(record), " "); }
 
-// Tests whether finer tolerances bring a method's runs nearer to one final pose. Convergence fails
-// for a wrong derivative, an ignored tolerance, or a motion without a limit.
-
-namespace {
-
-/// Returns all keys that name the case of a run, except its tolerance.
-std::string ColumnOf(const Record& record) {
-  std::string name = record.Text("problem_id");
-  for (const auto& [key, value] : record.items()) {
-    if (key == "case_id" || key == "problem_id") break;
-    if (key != "rtol" && !key.starts_with("atol")) name += "|" + key + "=" + record.Text(key);
-  }
-  return name;
-}
-
-/// ode45 makes ten steps of whatever is smooth: at any tolerance the same.
-constexpr double kTrivialSteps = 12.0;
-
-bool SameInEveryBit(const Record& a, const Record& b) {
-  return a.Number("steps") > kTrivialSteps && a.Number("steps") == b.Number("steps") &&
-         a.Number("rejected") == b.Number("rejected") && !a.Text("state_hash").empty() &&
-         a.Text("state_hash") == b.Text("state_hash");
-}
-
-/// Returns which records are flagged. Compares finished accuracy runs that differ only in the
-/// tolerance, for at least three tolerances: distances from the finest run must shrink. If a
-/// distance exceeds 1000 tolerances (kMaxTolerances) and has not shrunk by the fourth root of the
-/// tolerances' ratio, the finer runs are flagged. So are two runs of more than a dozen steps that
-/// are equal in every bit and step: the tolerance had no effect.
-std::vector<bool> FlaggedByTolerances(std::span<const Record> records) {
-  std::map<std::string, std::vector<std::size_t>> columns;
-  for (std::size_t i = 0; i < records.size(); ++i) {
-    const Record& record = records[i];
-    const bool counts =
-        IsFinishedRun(record) && !record.Text("problem_id").empty() && ToleranceOf(record) > 0.0;
-    if (counts) columns[ColumnOf(record)].push_back(i);
-  }
-  std::vector<bool> flagged(records.size(), false);
-  for (auto& [name, runs] : columns) {
-    const auto tolerance = [&](std::size_t run) { return ToleranceOf(records[run]); };
-    std::ranges::stable_sort(runs, std::greater<>(), tolerance);
-    const auto same = std::ranges::unique(runs, {}, tolerance);
-    runs.erase(same.begin(), same.end());
-    constexpr std::size_t kFewest = 3;
-    if (runs.size() < kFewest) continue;
-    const auto flag_from = [&](std::size_t first) {
-      for (std::size_t i = first; i < runs.size(); ++i) flagged[runs[i]] = true;
-    };
-    double off_before = 0.0;  // at the next coarser tolerance
-    for (std::size_t i = 0; i + 1 < runs.size(); ++i) {
-      const double off = DifferenceOf(records[runs[i]], records[runs.back()]).largest;
-      const double before = std::exchange(off_before, off);
-      if (SameInEveryBit(records[runs[i]], records[runs[i + 1]])) flag_from(i);
-      if (i == 0) continue;
-      const double shrunk = std::pow(tolerance(runs[i]) / tolerance(runs[i - 1]), 0.25);
-      const bool far = off > kMaxTolerances * tolerance(runs[i]) && off > kRoundOffShare;
-      if (far && off > shrunk * before) flag_from(i);
-    }
-  }
-  return flagged;
-}
-
-}  // namespace
-
-void SetWarnings(std::vector<Record>* records) {
-  std::vector<std::vector<std::string>> own;
-  std::vector<bool> testifies;
-  for (const Record& record : *records) {
-    own.push_back(OwnCodes(record));
-    // warnings on ensemble members and exponents do not concern the trajectory itself
-    testifies.push_back(std::ranges::all_of(own.back(), [](const std::string& code) {
-      return code == kMembersWarning || code == kExponentWarning;
-    }));
-  }
-  const std::vector<Agreement> agreements = CompareFinalPoses(*records, testifies);
-  const std::vector<bool> unconverged = FlaggedByTolerances(*records);
-  for (std::size_t i = 0; i < records->size(); ++i) {
-    Record& record = (*records)[i];
-    if (!IsFinishedRun(record)) continue;
-    std::vector<std::string>& codes = own[i];
-    // the others need not be right; a reference is
-    const bool certified = IsCertified(record);
-    // who ends as those do that can keep a branch has kept it
-    if (agreements[i].is_backed) std::erase(codes, kSingularWarning);
-    if (agreements[i].flagged && !certified) codes.emplace_back(kDisagreementWarning);
-    if (unconverged[i] && !certified) AddOnce(codes, kRefinementWarning);
-    record.Set("warnings", Joined(codes, " "));
-    if (agreements[i].cluster > 0) record.Set("agreement", agreements[i].cluster);
-  }
-}
-
 std::vector<std::string> WarningsOf(const Record& record) {
   std::istringstream codes(record.Text("warnings"));
   return {std::istream_iterator<std::string>(codes), {}};
@@ -672,6 +375,237 @@ std::vector<std::string> WarningsOf(const Record& record) {
 
 bool HasWarning(const Record& record, const std::string& code) {
   return code.empty() ? !record.Text("warnings").empty() : Contains(WarningsOf(record), code);
+}
+
+// Models.
+
+double LinkLength(const MechanismDescription& description) {
+  std::vector<Eigen::AlignedBox3d> joints(description.bodies.size());
+  double link = 0.0, arm = 0.0;
+  for (const JointDescription& joint : description.joints) {
+    if (joint.type == JointType::kRod) link = std::max(link, joint.parameter);
+    if (joint.type == JointType::kFree) continue;
+    for (const JointSide& side : {joint.from, joint.to}) {
+      if (side.body == kGround) continue;
+      const auto body = static_cast<std::size_t>(side.body);
+      joints[body].extend(side.position);
+      arm = std::max(arm, (side.position - description.bodies[body].com).norm());
+    }
+  }
+  for (const Eigen::AlignedBox3d& extent : joints) {
+    if (!extent.isEmpty()) link = std::max(link, extent.diagonal().norm());
+  }
+  if (link > 0.0) return link;
+  return arm > 0.0 ? arm : 1.0;
+}
+
+namespace {
+
+/// The heaviest body over the lightest: beyond it half the digits of a double are the light body's.
+constexpr double kLargestMassRatio = 1e8;
+/// Distance of a centre of mass from the middle of its joints over the mechanism's length. Poses
+/// refer to centres of mass, so joint positions have rounding errors eps times as large. Beyond
+/// this limit a tolerance of 1e-12 cannot be met.
+constexpr double kFarthestCentre = 1e3;
+
+/// Returns the first six names, and the number of others.
+std::string Shortened(const std::vector<std::string>& names) {
+  return FirstOf(names, 6, ", ", " and {} more");
+}
+
+void AddRankWarnings(const MechanismDescription& description, const Structure& structure,
+                     std::vector<std::string>* warnings) {
+  if (!structure.analysed) {
+    warnings->push_back(fmt::format(
+        "rank is not analysed: sparse pivots leave it uncertain, and {} speeds are more than {}",
+        structure.joint_u, kMaxAnalysedSpeeds));
+    return;
+  }
+  if (structure.rounding > 0.0) {
+    std::vector<std::string> joints;
+    for (const RedundantDirection& redundant : structure.redundant) {
+      if (redundant.coupling < 0)
+        AddOnce(joints, '"' + description.joints[redundant.joint].name + '"');
+    }
+    warnings->push_back(fmt::format(
+        "{} constraints of {} differ from dependent ones by {:.2g} rad or lengths, about the "
+        "accuracy {:g} of the input: runs remove them",
+        std::ranges::count(structure.redundant, -1, &RedundantDirection::coupling),
+        Joined(joints, ", "), structure.rounding, description.accuracy));
+  }
+  for (const RedundantDirection& redundant : structure.redundant) {
+    if (redundant.coupling < 0) continue;
+    warnings->push_back(
+        fmt::format("{} follows from other constraints, and runs do not analyse it: below level "
+                    "projection they may be wrong after singular configurations",
+                    redundant.name));
+  }
+  const bool driven = std::ranges::any_of(
+      description.joints, [](const JointDescription& joint) { return !joint.motions.empty(); });
+  const bool locked = structure.locked() && structure.bodies > 0 && !driven;
+  if (locked && structure.freedom_at_start() > 0) {
+    warnings->push_back(structure.start.message);
+  } else if (locked) {
+    const std::string joints = Joined(structure.loops, ", ", [&](const LoopPath& loop) {
+      return description.joints[loop.cut_joint].name;
+    });
+    warnings->push_back(fmt::format("{} is locked: its joints{} leave no motion at the start",
+                                    description.name,
+                                    joints.empty() ? "" : " and the loops closed by " + joints));
+  } else if (structure.singular_start()) {
+    warnings->push_back(
+        fmt::format("the start is a singular configuration: rank {} at the start, {} nearby",
+                    structure.rank, structure.rank_nearby));
+    if (structure.unmet_acceleration > 0.0) {
+      warnings->push_back(fmt::format(
+          "the speeds at the singular start belong to no motion: constraints miss {:.3g} m/s^2 "
+          "or rad/s^2 of acceleration; give the speeds of one branch",
+          structure.unmet_acceleration));
+    }
+  } else if (structure.conditioning() < kNearSingularRatio) {
+    warnings->push_back(fmt::format(
+        "the loops are nearly dependent at the start (bodies almost in line): smallest scaled "
+        "singular value {:.3g} of the largest",
+        structure.conditioning()));
+  }
+}
+
+}  // namespace
+
+std::vector<std::string> FindUnitWarnings(const MechanismDescription& description) {
+  std::vector<std::string> large;  // "OA = 45 rad"
+  double first = 0.0;
+  const auto add = [&](const std::string& name, double angle) {
+    if (std::abs(angle) <= 2 * std::numbers::pi) return;
+    if (large.empty()) first = angle;
+    large.push_back(fmt::format("{} = {:g} rad", name, angle));
+  };
+  const auto is_angle = [&](int joint, std::size_t coordinate) {
+    const auto words = ValueWords(description.joints[joint].type, description.space, false);
+    return coordinate < words.size() && words[coordinate].unit == "rad";
+  };
+  for (const JointValues& given : description.initial.coordinates) {
+    for (std::size_t i = 0; i < given.values.size(); ++i) {
+      if (is_angle(given.joint, i)) add(description.joints[given.joint].name, given.values[i]);
+    }
+  }
+  for (const JointDescription& joint : description.joints) {
+    add("rotation of " + joint.name, joint.from.rotation.norm());
+    add("rotation of " + joint.name, joint.to.rotation.norm());
+  }
+  for (ForceDescription force : description.forces) {
+    const ForceParts parts = PartsOf(force);
+    for (const ForceNumber& number : parts.numbers) {
+      if (number.quantity != quantity::kCoordinate || !is_angle(*parts.joint, 0)) continue;
+      add(fmt::format("{} of the {} in {}", number.key, parts.name,
+                      description.joints[*parts.joint].name),
+          *number.value);
+    }
+  }
+  if (large.empty()) return {};
+  return {
+      fmt::format("more than a turn: {}; angles are in rad, and {:g} degrees would be {:.6g} rad",
+                  Shortened(large), first, first * std::numbers::pi / 180)};
+}
+
+std::vector<std::string> FindGuessWarnings(const MechanismDescription& description,
+                                           const VectorX<double>& q) {
+  std::vector<std::string> warnings;
+  for (const MissedGuess& guess : FindMissedGuesses(description, q)) {
+    const JointDescription& joint = description.joints[guess.joint];
+    std::string& text =
+        warnings.emplace_back(fmt::format("the guess of joint \"{}\" is missed: ", joint.name));
+    if (guess.coordinate < 0) {
+      text += fmt::format("its orientation starts {:.4g} rad away", guess.by);
+    } else {
+      const auto words = ValueWords(joint.type, description.space, false);
+      const ValueWord& word = words[static_cast<std::size_t>(guess.coordinate)];
+      text += fmt::format("its {} starts at {:.6g} {}, guessed {:.6g} {}", word.name,
+                          guess.guess + guess.by, word.unit, guess.guess, word.unit);
+    }
+  }
+  for (const auto& [target, shift, turn] : FindMissedPoses(description, q)) {
+    std::string& text = warnings.emplace_back(
+        fmt::format("the target of body \"{}\" is missed:", description.bodies[target->body].name));
+    if (target->at) text += fmt::format(" its point starts {:.4g} m away", shift);
+    if (target->at && target->rotation) text += ",";
+    if (target->rotation) text += fmt::format(" its axes start {:.4g} rad away", turn);
+  }
+  return warnings;
+}
+
+std::vector<std::string> FindForceWarnings(const MechanismDescription& description,
+                                           const VectorX<double>& q) {
+  const auto is_spring = [](const ForceDescription& force) {
+    return std::holds_alternative<SpringDamper>(force);
+  };
+  if (std::ranges::none_of(description.forces, is_spring)) return {};
+  return ForSpace(description.space, [&]<class Space>(Space) {
+    const Mechanism<Space, double> mechanism(description, Coordinates::kJoint);
+    Kinematics<Space, double> kinematics(mechanism);
+    kinematics.UpdatePosition(q);
+    const auto at = [&](const BodyPoint& point) {
+      const PointOfBody<Space, double> material(point, description);
+      const Pose<Space, double>& X_WB = kinematics.poses()[material.body];
+      return Linear<Space, double>(X_WB.p + X_WB.R * material.at);
+    };
+    std::vector<std::string> warnings;
+    for (std::size_t i = 0; i < description.forces.size(); ++i) {
+      const auto* spring = std::get_if<SpringDamper>(&description.forces[i]);
+      if (spring == nullptr) continue;
+      const double distance = (at(spring->to) - at(spring->from)).norm();
+      if (distance > kCoincident * mechanism.length()) continue;
+      const double tension = TensionAtZeroLength(*spring);
+      if (tension == 0.0 && spring->damping == 0.0) continue;
+      warnings.push_back(
+          fmt::format("force {} ({}) has no direction at the start: its points coincide, and its "
+                      "{} does not act",
+                      i, NameOfForce(description, i),
+                      tension == 0.0 ? "damping" : fmt::format("tension of {:.4g} N", tension)));
+    }
+    return warnings;
+  });
+}
+
+std::vector<std::string> FindWarnings(const MechanismDescription& description,
+                                      const Structure& structure) {
+  std::vector<std::string> warnings = FindUnitWarnings(description);
+  if (structure.start.outcome == Outcome::kInconsistentStart) {
+    warnings.push_back(structure.start.message);
+  } else {
+    std::ranges::move(FindGuessWarnings(description, structure.start.q),
+                      std::back_inserter(warnings));
+    std::ranges::move(FindForceWarnings(description, structure.start.q),
+                      std::back_inserter(warnings));
+    if (!structure.start.has_given_speeds) {
+      warnings.emplace_back(
+          "the given speeds contradict each other by less than \"accuracy\": the nearest that fit "
+          "replace them");
+    }
+  }
+  AddRankWarnings(description, structure, &warnings);
+  for (const Island& island : structure.islands) {
+    if (island.grounded) continue;
+    const std::vector<std::string> names =
+        Mapped<std::string>(island.bodies, [&](int body) { return description.bodies[body].name; });
+    warnings.push_back(
+        fmt::format("unreachable from ground: no joint connects {}; it floats", Shortened(names)));
+  }
+  const auto [light, heavy] = std::ranges::minmax_element(
+      description.bodies.begin() + 1, description.bodies.end(), {}, &BodyDescription::mass);
+  if (heavy->mass > kLargestMassRatio * light->mass) {
+    warnings.push_back(fmt::format("{} has {:.3g} times the mass of {}", heavy->name,
+                                   heavy->mass / light->mass, light->name));
+  }
+  for (std::size_t body = 1; body < description.bodies.size(); ++body) {
+    const double distance = structure.centre_distances[body];
+    if (distance <= kFarthestCentre * structure.length) continue;
+    warnings.push_back(fmt::format(
+        "the centre of mass of {} is {:.3g} m from the middle of its joints, {:.3g} times the "
+        "mechanism's length: positions lose as many digits",
+        description.bodies[body].name, distance, distance / structure.length));
+  }
+  return warnings;
 }
 
 }  // namespace loopbench::harness

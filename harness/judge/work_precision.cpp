@@ -1,3 +1,4 @@
+// Work-precision comparisons: rows, fronts, fairness, tables and documents.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -5,13 +6,13 @@
 #include <cmath>
 #include <iterator>
 #include <map>
-#include <ranges>
 #include <set>
 #include <string_view>
 #include <utility>
 
 #include "harness/base/record.h"
 #include "harness/base/text.h"
+#include "harness/judge/analysis.h"
 #include "harness/judge/judge.h"
 #include "harness/judge/tables.h"
 
@@ -21,8 +22,6 @@ namespace {
 constexpr std::array kErrors = {"error_position_max",    "error_position_end", "error_path_max",
                                 "closed_form_error_max", "branch_error_max",   "energy_error_max",
                                 "drift_position_max"};
-// indirect indicators, not distances from the exact motion
-constexpr std::array kNoErrors = {"energy_error_max", "drift_position_max"};
 
 constexpr const char* kWall = "wall_s_median";
 
@@ -44,31 +43,6 @@ std::string NameOfCase(const Record& record) {
   return text;
 }
 
-std::string ErrorKey(std::span<const Record> records, const WorkPrecisionOptions& options,
-                     std::vector<std::string>* remarks) {
-  if (!options.error.empty()) {
-    RequireKey("--error-key", options.error, records);
-    if (HasNumber(records, options.error, "accuracy")) return options.error;
-    throw ConfigError(
-        fmt::format("--error-key {}: no accuracy record has a number there", options.error));
-  }
-  for (const std::string key : kErrors) {
-    if (!HasNumber(records, key, "accuracy")) continue;
-    if (key == kErrors.front()) return key;
-    remarks->push_back(fmt::format(
-        "no record has {} (errors against a certified reference): --error-key is {}{}",
-        kErrors.front(), key,
-        Contains(kNoErrors, key)
-            ? ", which is no distance from the right motion: a run may be far off and have little "
-              "of it"
-            : ""));
-    return key;
-  }
-  throw ConfigError(
-      fmt::format("--error-key: no accuracy record has one of {}", fmt::join(kErrors, ", ")));
-}
-
-/// Timings by the name of their case.
 using Timings = std::map<std::string, const Record*>;
 
 /// Returns the timing of the same case, or a record without keys.
@@ -78,28 +52,51 @@ const Record& TimingOf(const Record& run, const Timings& timings) {
   return place == timings.end() ? kNone : *place->second;
 }
 
-std::string CostKey(std::span<const Record> records, const Timings& timings,
-                    const WorkPrecisionOptions& options, std::vector<std::string>* remarks) {
-  if (options.cost.empty()) {
-    // timings of other cases, such as timings at a common tolerance, do not match
-    const bool any = std::ranges::any_of(records, [&](const Record& record) {
-      return record.Text("kind") == "accuracy" &&
-             std::isfinite(TimingOf(record, timings).Number(kWall));
-    });
-    if (any) return kWall;
-    remarks->push_back(
-        "no accuracy case was timed as it is (\"timing\": {\"cases\": true} does it): --cost-key "
-        "is "
-        "rhs_equivalents");
-    return "rhs_equivalents";
+std::string ErrorKey(std::span<const Record> records, const std::string& wanted,
+                     std::vector<std::string>* remarks) {
+  if (!wanted.empty()) {
+    RequireKey("--error-key", wanted, records);
+    if (HasNumber(records, wanted, "accuracy")) return wanted;
+    throw ConfigError(fmt::format("--error-key {}: no accuracy record has a number there", wanted));
   }
-  const std::string key = options.cost == "wall_s" ? kWall : options.cost;
-  RequireKey("--cost-key", key, records);
-  if (HasNumber(records, key, "accuracy") || HasNumber(records, key, "timing")) return key;
-  throw ConfigError(fmt::format("--cost-key {}: no record has a number there", options.cost));
+  const auto* key = std::ranges::find_if(
+      kErrors, [&](const char* one) { return HasNumber(records, one, "accuracy"); });
+  if (key == kErrors.end()) {
+    throw ConfigError(
+        fmt::format("--error-key: no accuracy record has one of {}", fmt::join(kErrors, ", ")));
+  }
+  if (key == kErrors.begin()) return *key;
+  // the last ones are indirect indicators, not distances from the exact motion
+  const bool is_indicator = kErrors.end() - key <= 2;
+  remarks->push_back(fmt::format(
+      "no record has {} (errors against a certified reference): --error-key is {}{}",
+      kErrors.front(), *key,
+      is_indicator ? ", which is no distance from the right motion: a run may be far off and have "
+                     "little of it"
+                   : ""));
+  return *key;
 }
 
-/// Returns the run with additional keys of its timing.
+std::string CostKey(std::span<const Record> records, const Timings& timings,
+                    const std::string& wanted, std::vector<std::string>* remarks) {
+  if (!wanted.empty()) {
+    const std::string key = wanted == "wall_s" ? kWall : wanted;
+    RequireKey("--cost-key", key, records);
+    if (HasNumber(records, key, "accuracy") || HasNumber(records, key, "timing")) return key;
+    throw ConfigError(fmt::format("--cost-key {}: no record has a number there", wanted));
+  }
+  // timings of other cases, such as timings at a common tolerance, do not match
+  const bool any = std::ranges::any_of(records, [&](const Record& record) {
+    return record.Text("kind") == "accuracy" &&
+           std::isfinite(TimingOf(record, timings).Number(kWall));
+  });
+  if (any) return kWall;
+  remarks->push_back(
+      "no accuracy case was timed as it is (\"timing\": {\"cases\": true} does it): --cost-key "
+      "is rhs_equivalents");
+  return "rhs_equivalents";
+}
+
 Record WithTiming(const Record& run, const Record& timing) {
   Record joined = run;
   for (const auto& [key, value] : timing.items()) {
@@ -108,25 +105,19 @@ Record WithTiming(const Record& run, const Record& timing) {
   return joined;
 }
 
-std::string WhyNoCost(const WorkPrecisionRow& row, const WorkPrecision& work_precision) {
-  if (std::isfinite(row.cost)) return "";
-  const bool is_time = work_precision.cost == kWall;
-  if (is_time && row.timing.items().empty()) return "not timed";
-  const std::string outcome = row.timing.Text("outcome");
-  if (is_time && outcome != "finished") return "timing: " + outcome;
-  return "no " + work_precision.cost;
-}
-
 std::string WhyNotCompared(const WorkPrecisionRow& row, const WorkPrecision& work_precision) {
-  if (HasFailed(row.record)) {
-    return fmt::format("{} at {:.3g} s", row.record.Text("outcome"),
-                       row.record.Number("t_reached"));
+  const Record& run = row.record;
+  if (HasFailed(run)) {
+    return fmt::format("{} at {:.3g} s", run.Text("outcome"), run.Number("t_reached"));
   }
-  if (const std::string warnings = row.record.Text("warnings"); !warnings.empty()) {
-    return "warnings: " + warnings;
-  }
+  if (HasWarning(run)) return "warnings: " + run.Text("warnings");
   if (!std::isfinite(row.error)) return "no " + work_precision.error;
-  return WhyNoCost(row, work_precision);
+  if (std::isfinite(row.cost)) return "";
+  if (work_precision.cost == kWall) {
+    if (row.timing.items().empty()) return "not timed";
+    if (row.timing.Text("outcome") != "finished") return "timing: " + row.timing.Text("outcome");
+  }
+  return "no " + work_precision.cost;
 }
 
 WorkPrecisionRow MakeRow(const Record& run, const Record& timing,
@@ -143,17 +134,6 @@ WorkPrecisionRow MakeRow(const Record& run, const Record& timing,
   return row;
 }
 
-/// "four-bar, horizon 10": texts unchanged, numbers with their key.
-std::string NameOfProblem(const Record& record, const std::vector<std::string>& per) {
-  std::string name;
-  for (const std::string& key : per) {
-    const Value* value = record.Find(key);
-    const bool is_text = value != nullptr && std::holds_alternative<std::string>(*value);
-    name += (name.empty() ? "" : ", ") + (is_text ? "" : key + " ") + record.Text(key);
-  }
-  return name;
-}
-
 /// Marks the front. Rows are sorted by cost, then error: a row is on the front if it is better than
 /// all before it, or equal to a row of the front.
 void MarkFront(std::vector<WorkPrecisionRow>* rows) {
@@ -166,40 +146,28 @@ void MarkFront(std::vector<WorkPrecisionRow>* rows) {
   }
 }
 
-std::vector<std::string> FormulationsOf(const std::vector<WorkPrecisionRow>& rows) {
-  std::set<std::string> names;
-  for (const WorkPrecisionRow& row : rows) names.insert(row.record.Text("formulation"));
-  return {names.begin(), names.end()};
-}
-
-/// Returns the first suitable row, which is the cheapest: rows are in order of cost.
-int CheapestOf(const std::vector<WorkPrecisionRow>& rows, const std::string& formulation,
-               double error_class) {
-  const auto found = std::ranges::find_if(rows, [&](const WorkPrecisionRow& row) {
-    return row.reason.empty() && row.error <= error_class &&
-           row.record.Text("formulation") == formulation;
-  });
-  return found == rows.end() ? -1 : static_cast<int>(found - rows.begin());
-}
-
+/// Finds the first suitable rows, which are the cheapest: rows are in order of cost.
 void FindCheapest(const std::vector<double>& classes, WorkPrecisionProblem* problem) {
   const std::vector<WorkPrecisionRow>& rows = problem->rows;
+  std::set<std::string> formulations;
+  for (const WorkPrecisionRow& row : rows) formulations.insert(row.record.Text("formulation"));
   for (const double error_class : classes) {
-    const std::size_t first = problem->cheapest.size();
-    double least = std::numeric_limits<double>::infinity();
-    for (const std::string& formulation : FormulationsOf(rows)) {
-      const int row = CheapestOf(rows, formulation, error_class);
-      problem->cheapest.push_back(
-          {.error_class = error_class, .formulation = formulation, .row = row});
-      if (row >= 0) least = std::min(least, rows[static_cast<std::size_t>(row)].cost);
-    }
-    for (Cheapest& one : problem->cheapest | std::views::drop(first)) {
-      if (one.row >= 0) one.ratio = rows[static_cast<std::size_t>(one.row)].cost / least;
+    const auto reaches = [&](const WorkPrecisionRow& row) {
+      return row.reason.empty() && row.error <= error_class;
+    };
+    const auto least = std::ranges::find_if(rows, reaches);
+    for (const std::string& formulation : formulations) {
+      Cheapest& one = problem->cheapest.emplace_back(Cheapest{error_class, formulation});
+      const auto found = std::ranges::find_if(rows, [&](const WorkPrecisionRow& row) {
+        return reaches(row) && row.record.Text("formulation") == formulation;
+      });
+      if (found == rows.end()) continue;
+      one.row = static_cast<int>(found - rows.begin());
+      one.ratio = found->cost / least->cost;
     }
   }
 }
 
-/// Compares costs; NaN comes last.
 bool IsCheaper(const WorkPrecisionRow& a, const WorkPrecisionRow& b) {
   const auto key = [](double value) {
     return std::isnan(value) ? std::numeric_limits<double>::infinity() : value;
@@ -220,19 +188,19 @@ WorkPrecision MakeWorkPrecision(std::span<const Record> records,
   for (const std::string& key : options.per) RequireKey("--per", key, records);
   RequireConditions("--where", options.where, records);
   WorkPrecision work_precision;
-  work_precision.error = ErrorKey(records, options, &work_precision.remarks);
+  work_precision.error = ErrorKey(records, options.error, &work_precision.remarks);
   Timings timings;
   for (const Record& record : records) {
     if (record.Text("kind") == "timing") timings[NameOfCase(record)] = &record;
   }
-  work_precision.cost = CostKey(records, timings, options, &work_precision.remarks);
+  work_precision.cost = CostKey(records, timings, options.cost, &work_precision.remarks);
   std::vector<Record> runs = Filter(records, {{"kind", {"accuracy"}}});
   SortRows(&runs);  // equal costs stay in the order of tables
   std::map<std::string, std::size_t> places;
   for (const Record& run : runs) {
     WorkPrecisionRow row = MakeRow(run, TimingOf(run, timings), work_precision);
     if (!Matches(row.record, options.where)) continue;
-    const std::string name = NameOfProblem(run, options.per);
+    const std::string name = NameBy(run, options.per, ", ");
     const auto [place, is_new] = places.try_emplace(name, work_precision.problems.size());
     if (is_new) work_precision.problems.push_back({.name = name, .rows = {}, .cheapest = {}});
     work_precision.problems[place->second].rows.push_back(std::move(row));
@@ -248,15 +216,24 @@ WorkPrecision MakeWorkPrecision(std::span<const Record> records,
   }
   return work_precision;
 }
+
 namespace {
 
-/// Returns the rows of all problems, only the compared ones or only the others.
-std::vector<const WorkPrecisionRow*> RowsOf(const WorkPrecision& work_precision, bool compared) {
-  std::vector<const WorkPrecisionRow*> rows;
+using Rows = std::vector<const WorkPrecisionRow*>;
+
+/// Returns the rows, only the compared ones or only the others.
+Rows RowsOf(const WorkPrecisionProblem& problem, bool compared) {
+  Rows rows;
+  for (const WorkPrecisionRow& row : problem.rows) {
+    if (row.reason.empty() == compared) rows.push_back(&row);
+  }
+  return rows;
+}
+
+Rows RowsOf(const WorkPrecision& work_precision, bool compared) {
+  Rows rows;
   for (const WorkPrecisionProblem& problem : work_precision.problems) {
-    for (const WorkPrecisionRow& row : problem.rows) {
-      if (row.reason.empty() == compared) rows.push_back(&row);
-    }
+    std::ranges::move(RowsOf(problem, compared), std::back_inserter(rows));
   }
   return rows;
 }
@@ -293,45 +270,12 @@ constexpr std::array kAspects = {
     Aspect{"repeats of timings", "repeats", true},
 };
 
-std::string ValueOf(const WorkPrecisionRow& row, const Aspect& aspect) {
-  const bool of_timing = aspect.is_of_machine && row.timing.Find(aspect.key) != nullptr;
-  const std::string text = (of_timing ? row.timing : row.record).Text(aspect.key);
-  return text.empty() ? aspect.standard : text;
-}
-
-/// Values of one setting in the compared rows of all problems.
-struct ValueShares {
-  bool is_equal = true;  ///< within each problem
-  /// In order of first appearance, with the number of rows.
-  std::vector<std::pair<std::string, int>> values;
-};
-
-ValueShares FindValues(const WorkPrecision& work_precision, const Aspect& aspect) {
-  ValueShares finding;
-  for (const WorkPrecisionProblem& problem : work_precision.problems) {
-    std::set<std::string> own;
-    for (const WorkPrecisionRow& row : problem.rows) {
-      if (!row.reason.empty()) continue;
-      const std::string value = ValueOf(row, aspect);
-      own.insert(value);
-      auto place = std::ranges::find(finding.values, value, &std::pair<std::string, int>::first);
-      if (place == finding.values.end()) place = finding.values.insert(place, {value, 0});
-      ++place->second;
-    }
-    finding.is_equal = finding.is_equal && own.size() <= 1;
-  }
-  return finding;
-}
-
-/// "integrator (ode45 40, verner 38)"; long lists are cut.
-std::string Shares(const Aspect& aspect, const ValueShares& finding) {
-  constexpr std::size_t kMaxShown = 8;
-  const std::size_t more = finding.values.size() - std::min(finding.values.size(), kMaxShown);
-  return fmt::format(
-      "{} ({}{})", aspect.words,
-      Joined(finding.values | std::views::take(kMaxShown), ", ",
-             [](const auto& one) { return fmt::format("{} {}", one.first, one.second); }),
-      more > 0 ? fmt::format(" and {} more", more) : "");
+auto ByValue(const Rows& rows, const Aspect& aspect) {
+  return GroupBy(rows, [&](const WorkPrecisionRow* row) {
+    const bool of_timing = aspect.is_of_machine && row->timing.Find(aspect.key) != nullptr;
+    const std::string text = (of_timing ? row->timing : row->record).Text(aspect.key);
+    return text.empty() ? aspect.standard : text;
+  });
 }
 
 bool IsTime(const std::string& cost) {
@@ -340,19 +284,19 @@ bool IsTime(const std::string& cost) {
 }
 
 /// Returns a line with the error, the certified error of references, and its influence.
-std::string ErrorLine(const WorkPrecision& work_precision) {
+std::string ErrorLine(const WorkPrecision& work_precision, const Rows& rows) {
   double least = INFINITY, most = 0.0;
   int bounds = 0, beyond = 0;
-  for (const WorkPrecisionRow* row : RowsOf(work_precision, true)) {
+  for (const WorkPrecisionRow* row : rows) {
     const double certified = row->record.Number("reference_error");
     if (std::isfinite(certified)) {
       least = std::min(least, certified);
       most = std::max(most, certified);
     }
-    bounds += row->is_bound ? 1 : 0;
-    beyond += row->record.Number("reference_valid_until") < row->record.Number("horizon") ? 1 : 0;
+    bounds += row->is_bound;
+    beyond += row->record.Number("reference_valid_until") < row->record.Number("horizon");
   }
-  std::string line = fmt::format("error: {}", work_precision.error);
+  std::string line = "error: " + work_precision.error;
   if (std::isfinite(least) && work_precision.error.starts_with("error_")) {
     line += fmt::format(", against references certified to {:.1e}", least);
     if (most > least) line += fmt::format(" to {:.1e}", most);
@@ -369,27 +313,25 @@ std::string ErrorLine(const WorkPrecision& work_precision) {
   return line;
 }
 
-std::string CostLine(const WorkPrecision& work_precision) {
-  if (work_precision.cost == "wall_s_median") {
+std::string CostLine(const WorkPrecision& work_precision, const Rows& rows) {
+  const std::string& cost = work_precision.cost;
+  if (cost == kWall) {
     return "cost: wall_s_median [s], simulations timed one at a time, without observers";
   }
-  std::string line = "cost: " + WithUnit(work_precision.cost, work_precision.cost);
-  const bool is_count = work_precision.cost.starts_with("rhs_e") || work_precision.cost == "steps";
-  const bool any = std::ranges::any_of(
-      RowsOf(work_precision, true),
-      [](const WorkPrecisionRow* row) { return row->record.Number("newton_iterations") > 0; });
-  if (is_count && any) {
-    line +=
-        "; of implicit integrators it leaves out Jacobians and linear solves, so that they look "
-        "cheaper than they are";
-  }
-  return line;
+  const bool is_count = cost.starts_with("rhs_e") || cost == "steps";
+  const bool any = std::ranges::any_of(rows, [](const WorkPrecisionRow* row) {
+    return row->record.Number("newton_iterations") > 0;
+  });
+  return "cost: " + WithUnit(cost) +
+         (is_count && any ? "; of implicit integrators it leaves out Jacobians and linear solves, "
+                            "so that they look cheaper than they are"
+                          : "");
 }
 
 /// Returns true if compared formulations run library code, which is not equally optimized.
-bool ComparesLibraryCode(const WorkPrecision& work_precision) {
+bool ComparesLibraryCode(const Rows& rows) {
   std::set<std::string> formulations;
-  for (const WorkPrecisionRow* row : RowsOf(work_precision, true)) {
+  for (const WorkPrecisionRow* row : rows) {
     if (row->record.Text("execution").empty()) {
       formulations.insert(row->record.Text("formulation"));
     }
@@ -400,47 +342,50 @@ bool ComparesLibraryCode(const WorkPrecision& work_precision) {
 }  // namespace
 
 std::vector<std::string> FairnessStatement(const WorkPrecision& work_precision) {
-  std::vector<std::string> equal, unequal, unknown, lines;
+  const Rows rows = RowsOf(work_precision, true), others = RowsOf(work_precision, false);
+  std::vector<std::string> equal, unequal, unknown;
   bool one_machine = true;
   for (const Aspect& aspect : kAspects) {
-    const ValueShares finding = FindValues(work_precision, aspect);
-    if (finding.values.empty()) continue;
-    const std::string& first = finding.values.front().first;
-    const bool is_single = finding.values.size() == 1;
-    if (is_single && first.empty()) {
+    const auto values = ByValue(rows, aspect);
+    if (values.empty()) continue;
+    const std::string& first = values.front().first;
+    const bool is_equal =
+        std::ranges::all_of(work_precision.problems, [&](const WorkPrecisionProblem& problem) {
+          return ByValue(RowsOf(problem, true), aspect).size() <= 1;
+        });
+    if (values.size() == 1 && first.empty()) {
       unknown.push_back(aspect.words);
-    } else if (is_single) {
+    } else if (values.size() == 1) {
       equal.push_back(fmt::format("{} {}", aspect.words, first));
-    } else if (finding.is_equal) {
+    } else if (is_equal) {
       equal.push_back(fmt::format("{} (in each problem)", aspect.words));
     } else {
-      unequal.push_back(Shares(aspect, finding));
+      constexpr std::size_t kMaxShown = 8;
+      const std::vector<std::string> shares = Mapped<std::string>(values, [](const auto& value) {
+        return fmt::format("{} {}", value.first, value.second.size());
+      });
+      unequal.push_back(
+          fmt::format("{} ({})", aspect.words, FirstOf(shares, kMaxShown, ", ", " and {} more")));
     }
-    if (std::string_view(aspect.key) == "machine") one_machine = finding.is_equal;
+    if (std::string_view(aspect.key) == "machine") one_machine = is_equal;
   }
-  lines.push_back(ErrorLine(work_precision));
-  lines.push_back(CostLine(work_precision));
-  if (!equal.empty()) lines.push_back("equal in all compared rows: " + Joined(equal, "; "));
-  if (!unequal.empty()) lines.push_back("not equal (rows): " + Joined(unequal, "; "));
-  if (!unknown.empty()) lines.push_back("not recorded: " + Joined(unknown, "; "));
-  std::vector<std::string> reasons;  // without their numbers
-  for (const WorkPrecisionRow* row : RowsOf(work_precision, false)) {
-    reasons.push_back(row->reason.substr(0, row->reason.find(" at ")));
+  std::vector<std::string> lines = {ErrorLine(work_precision, rows),
+                                    CostLine(work_precision, rows)};
+  for (const auto& [words, list] : {std::pair("equal in all compared rows: ", &equal),
+                                    {"not equal (rows): ", &unequal},
+                                    {"not recorded: ", &unknown}}) {
+    if (!list->empty()) lines.push_back(words + Joined(*list, "; "));
   }
-  std::size_t all = 0;
-  std::vector<Record> timings;
-  for (const WorkPrecisionProblem& problem : work_precision.problems) {
-    all += problem.rows.size();
-    for (const WorkPrecisionRow& row : problem.rows) {
-      if (!row.timing.items().empty()) timings.push_back(row.timing);
-    }
-  }
-  if (!reasons.empty()) {
-    lines.push_back(fmt::format("{} of {} rows are not compared: {}", reasons.size(), all,
-                                CountWords(reasons)));
+  if (!others.empty()) {
+    const auto without_numbers = [](const WorkPrecisionRow* row) {
+      return row->reason.substr(0, row->reason.find(" at "));
+    };
+    lines.push_back(fmt::format("{} of {} rows are not compared: {}", others.size(),
+                                rows.size() + others.size(),
+                                CountWords(Mapped<std::string>(others, without_numbers))));
   }
   if (!IsTime(work_precision.cost)) return lines;
-  if (ComparesLibraryCode(work_precision)) {
+  if (ComparesLibraryCode(rows)) {
     lines.emplace_back(
         "not equal: the library's code. O-DCA has special code, vector instructions and fused "
         "multiply-add; other formulations have none. Equal code: execution generated; counts: "
@@ -449,8 +394,197 @@ std::vector<std::string> FairnessStatement(const WorkPrecision& work_precision) 
   if (!one_machine) {
     lines.push_back("warning: the costs are times of more than one machine, which do not compare");
   }
+  std::vector<Record> timings;
+  for (const WorkPrecisionProblem& problem : work_precision.problems) {
+    for (const WorkPrecisionRow& row : problem.rows) {
+      if (!row.timing.items().empty()) timings.push_back(row.timing);
+    }
+  }
   std::ranges::move(NoiseWarnings(timings), std::back_inserter(lines));
   return lines;
+}
+
+namespace {
+
+constexpr const char* kNobody = "none";
+
+std::string FrontColour(const Record& row, const TableColumn& column) {
+  if (column.key == "front") return row.Text("front") == "*" ? "32" : "";
+  if (column.key != "reason") return "";
+  if (HasFailed(row)) return "31";
+  return row.Text("warnings").empty() ? "" : "33";
+}
+
+std::vector<Record> RecordsOfRows(const WorkPrecision& work_precision) {
+  std::vector<Record> records;
+  for (const WorkPrecisionProblem& problem : work_precision.problems) {
+    for (const WorkPrecisionRow& row : problem.rows) records.push_back(row.record);
+  }
+  return records;
+}
+
+/// Returns the columns of methods. Compact tables have short words and no constant columns except
+/// the formulation.
+std::vector<TableColumn> MethodColumns(const std::vector<Record>& records, bool compact) {
+  constexpr std::string_view kOthers[] = {"kind", "experiment", "mechanism", "horizon"};
+  std::vector<TableColumn> columns;
+  for (const std::string& key : CaseKeysOf(records)) {
+    if (Contains(kOthers, key) || (key == "atol" && AtolFollowsRtol(records))) continue;
+    if (compact && key != "formulation" && IsAlike(records, key)) continue;
+    const TableColumn column = ColumnOf(key, records);
+    columns.push_back(compact ? CompactCaseColumn(key).value_or(column) : column);
+  }
+  return columns;
+}
+
+Record ShownRow(const WorkPrecisionProblem& problem, const WorkPrecisionRow& row) {
+  const auto number = [](double value) { return std::isfinite(value) ? Value(value) : Value(); };
+  Record shown = row.record;
+  shown.Set("problem", problem.name);
+  shown.Set("front", std::string(row.on_front ? "*" : ""));
+  shown.Set("error", number(row.error));
+  shown.Set("error_is_bound", row.is_bound);
+  shown.Set("cost", number(row.cost));
+  shown.Set("reason", row.reason);
+  return shown;
+}
+
+TableColumn ErrorColumn(const WorkPrecision& work_precision) {
+  return {"error", WithUnit("error", work_precision.error), Format::kScientific};
+}
+
+TableColumn ClassColumn(const WorkPrecision& work_precision) {
+  return {"error_class", WithUnit("error <=", work_precision.error), Format::kShortest};
+}
+
+TableColumn CostColumn(const WorkPrecision& work_precision) {
+  const std::optional<TableColumn> known = KnownColumn(work_precision.cost);
+  return {"cost", WithUnit("cost", work_precision.cost), known ? known->format : Format::kShortest};
+}
+
+/// Returns the columns of the rows; compact tables have the front first, and no details.
+std::vector<TableColumn> RowColumns(const WorkPrecision& work_precision,
+                                    const std::vector<Record>& records, bool compact) {
+  std::vector<TableColumn> columns = Columns(compact ? "front=" : "problem");
+  std::ranges::move(MethodColumns(records, compact), std::back_inserter(columns));
+  columns.push_back(ErrorColumn(work_precision));
+  if (!compact) columns.push_back({"error_is_bound", "is bound"});
+  columns.push_back(CostColumn(work_precision));
+  if (!compact) {
+    columns.push_back({"front", "front"});
+    const std::vector<std::string> keys = KeysOf(records);
+    for (const char* key : {"outcome", "warnings", "reference_error", "reference_valid_until",
+                            "steps", "rejected", "rhs_evaluations", "aa_spread_wall"}) {
+      if (Contains(keys, key)) columns.push_back(ColumnOf(key, records));
+    }
+  }
+  columns.push_back({"reason", "not compared because"});
+  return columns;
+}
+
+/// "accel joint ode45 1e-06": the method within a formulation, by the keys that differ.
+std::string MethodText(const Record& record, const std::vector<TableColumn>& columns) {
+  std::string text;
+  for (const TableColumn& column : columns) {
+    const std::string cell = Cell(record, column);
+    if (column.key == "formulation" || cell.empty()) continue;
+    const bool is_bare = column.format == Format::kText || column.key == "rtol";
+    text += fmt::format("{}{}{}", text.empty() ? "" : " ", is_bare ? "" : column.key + " ", cell);
+  }
+  return text;
+}
+
+const WorkPrecisionRow& RowOf(const WorkPrecisionProblem& problem, const Cheapest& one) {
+  return problem.rows[static_cast<std::size_t>(one.row)];
+}
+
+}  // namespace
+
+Table WorkPrecisionTable(const WorkPrecision& work_precision, const WorkPrecisionView& view) {
+  Table table{.title = fmt::format("{} against {}", work_precision.error, work_precision.cost),
+              .columns = RowColumns(work_precision, RecordsOfRows(work_precision), view.compact),
+              .notes = work_precision.remarks,
+              .group = "problem",
+              .colour = &FrontColour};
+  std::size_t hidden = 0;
+  for (const WorkPrecisionProblem& problem : work_precision.problems) {
+    for (const WorkPrecisionRow& row : problem.rows) {
+      if (view.all || row.on_front || !row.reason.empty()) {
+        table.rows.push_back(ShownRow(problem, row));
+      } else {
+        ++hidden;
+      }
+    }
+  }
+  table.notes.push_back(
+      "* = Pareto front: no compared row is better in one value and as good in the other");
+  if (hidden > 0) {
+    table.notes.push_back(fmt::format("not shown: {} dominated rows (--all)", hidden));
+  }
+  return table;
+}
+
+Table OverviewTable(const WorkPrecision& work_precision) {
+  std::set<std::string> names;
+  for (const WorkPrecisionProblem& problem : work_precision.problems) {
+    for (const Cheapest& one : problem.cheapest) names.insert(one.formulation);
+  }
+  Table table{.title = fmt::format(
+                  "The cheapest method for an error: {}, and its ratio to the cheapest of all",
+                  WithUnit(work_precision.cost)),
+              .columns = {{"problem", "problem"}, ClassColumn(work_precision)}};
+  for (const std::string& name : names) table.columns.push_back({name, name});
+  for (const WorkPrecisionProblem& problem : work_precision.problems) {
+    Record* row = nullptr;
+    double last = kNoNumber;
+    for (const Cheapest& one : problem.cheapest) {
+      if (one.error_class != last) {
+        row = &table.rows.emplace_back();
+        row->Set("problem", problem.name);
+        row->Set("error_class", last = one.error_class);
+      }
+      row->Set(one.formulation,
+               one.row < 0 ? std::string(kNobody)
+                           : fmt::format("{:.3g} ({:.2f})", RowOf(problem, one).cost, one.ratio));
+    }
+  }
+  return table;
+}
+
+Table CheapestTable(const WorkPrecision& work_precision) {
+  const std::vector<TableColumn> naming = MethodColumns(RecordsOfRows(work_precision), true);
+  Table table{.title = "The cheapest methods",
+              .columns = {{"problem", "problem"},
+                          ClassColumn(work_precision),
+                          {"formulation", "formulation"},
+                          {"method", "method"},
+                          ErrorColumn(work_precision),
+                          CostColumn(work_precision),
+                          {"ratio", "to the cheapest", Format::kExponent}}};
+  for (const WorkPrecisionProblem& problem : work_precision.problems) {
+    for (const Cheapest& one : problem.cheapest) {
+      if (one.row < 0) {
+        AddRow({problem.name, one.error_class, one.formulation, kNobody}, &table);
+        continue;
+      }
+      const WorkPrecisionRow& row = RowOf(problem, one);
+      AddRow({problem.name, one.error_class, one.formulation, MethodText(row.record, naming),
+              row.error, row.cost, one.ratio},
+             &table);
+    }
+  }
+  return table;
+}
+
+std::string WorkPrecisionMarkdown(const WorkPrecision& work_precision,
+                                  const std::vector<std::string>& notes) {
+  Table overview = OverviewTable(work_precision);
+  overview.notes = work_precision.remarks;
+  overview.AddNotes(FairnessStatement(work_precision));
+  Table rows = WorkPrecisionTable(work_precision, {.compact = false, .all = true});
+  rows.AddNotes(notes);
+  return ToMarkdown(overview) + "\n" + ToMarkdown(CheapestTable(work_precision)) + "\n" +
+         ToMarkdown(rows);
 }
 
 }  // namespace loopbench::harness

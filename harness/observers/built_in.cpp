@@ -1,5 +1,4 @@
-// The built-in observers: drift, energy, errors against closed forms, coordinates, nearness to
-// singular positions, steps.
+// The built-in observers.
 #include <algorithm>
 #include <array>
 #include <boost/math/special_functions/ellint_1.hpp>
@@ -16,42 +15,6 @@
 
 namespace loopbench::harness {
 namespace {
-
-// Returns the kept indices of `n` samples: evenly spaced, always with the last one.
-std::vector<std::size_t> Kept(std::size_t n, int points) {
-  const std::size_t count = std::min(n, static_cast<std::size_t>(points));
-  std::vector<std::size_t> kept(count);
-  for (std::size_t i = 0; i < count; ++i) kept[i] = count == n ? i : i * (n - 1) / (count - 1);
-  return kept;
-}
-
-}  // namespace
-
-TimeSeries Thin(const TimeSeries& series, int points, std::size_t samples) {
-  TimeSeries thin;
-  for (const std::size_t k : Kept(std::min(samples, series.t.size()), points)) {
-    thin.t.push_back(series.t[k]);
-    thin.value.push_back(series.value[k]);
-  }
-  return thin;
-}
-
-namespace {
-
-/// The largest distance of the first `samples` from the line through those that Thin() keeps.
-double LargestGap(const TimeSeries& series, int points, std::size_t samples) {
-  const std::vector<std::size_t> kept = Kept(samples, points);
-  double gap = 0.0;
-  for (std::size_t i = 1; i < kept.size(); ++i) {
-    const std::size_t a = kept[i - 1], b = kept[i];
-    const double slope = (series.value[b] - series.value[a]) / (series.t[b] - series.t[a]);
-    for (std::size_t k = a + 1; k < b; ++k) {
-      const double line = series.value[a] + slope * (series.t[k] - series.t[a]);
-      gap = std::max(gap, std::abs(series.value[k] - line));
-    }
-  }
-  return gap;
-}
 
 /// The loops of a mechanism in joint coordinates, whatever coordinates are integrated.
 template <class Space>
@@ -130,8 +93,7 @@ struct Largest {
   }
 };
 
-/// A mismatch of a coupling or its rate as a shift of its first joint's coordinate; angles count as
-/// arcs at the length of the mechanism.
+/// A mismatch of a coupling or its rate as a shift of its first joint; angles as arcs at a length.
 template <class Space>
 double ShiftOf(const Kinematics<Space, double>& kinematics, int coupling, double mismatch,
                double* rotation) {
@@ -544,164 +506,6 @@ class ExactObserver final : public Observer<Space> {
   TimeSeries branch_;
 };
 
-/// Joint coordinates over time, of mechanisms with few of them, for figures: "series.angle.JOINT"
-/// [rad] and "series.displacement.JOINT" [m] over "series.t", for the whole run. These few points
-/// may not show the motion: a straight line between two of them misses a sample by more than 1 % of
-/// all angles or displacements. Then the same number of points covers its first half, quarter, ...
-/// that they do show: "series.opening.angle.JOINT" and so on over "series.opening_t".
-template <class Space>
-class CoordinateObserver final : public Observer<Space> {
- public:
-  explicit CoordinateObserver(int points) : points_(points) {}
-
-  void Observe(const Sample<Space>& sample) override {
-    const Kinematics<Space, double>& kinematics = sample.formulation.kinematics();
-    const auto& joints = kinematics.mechanism().joints();
-    constexpr std::size_t kMaxJoints = 1000;
-    if (joints.size() > kMaxJoints) return;
-    const bool first = series_.empty();
-    std::size_t s = 0;
-    for (int j = 0; j < static_cast<int>(joints.size()); ++j) {
-      if (joints[j].description < 0 || joints[j].kind->num_u != 1) continue;
-      if (first) {
-        // motions have their rotations first; a helix is measured by its angle
-        const bool shifts = joints[j].kind->axes[0] >= Space::kRot;
-        keys_.push_back((shifts ? "displacement." : "angle.") +
-                        kinematics.mechanism().joint_names()[j]);
-        (shifts ? shifts_ : angles_).push_back(s);
-        series_.emplace_back();
-      }
-      series_[s++].Add(sample.t, kinematics.JointCoordinate(j));
-    }
-  }
-
-  void Write(Record& record) const override {
-    if (series_.empty()) return;
-    const std::size_t all = series_[0].t.size();
-    WriteOpening(all, "series.", "series.t", record);
-    std::size_t shown = all;
-    while (!Shows(angles_, shown) || !Shows(shifts_, shown)) shown /= 2;
-    if (shown < all) WriteOpening(shown, "series.opening.", "series.opening_t", record);
-  }
-
- private:
-  /// Returns true if the points kept of the first `samples` show them, on the group's common axis.
-  bool Shows(const std::vector<std::size_t>& group, std::size_t samples) const {
-    if (samples <= static_cast<std::size_t>(points_)) return true;
-    // a hundredth of the axis is four pixels of a figure
-    constexpr double kVisible = 0.01;
-    double low = std::numeric_limits<double>::infinity(), high = -low;
-    for (const std::size_t s : group) {
-      for (std::size_t i = 0; i < samples; ++i) {
-        low = std::min(low, series_[s].value[i]);
-        high = std::max(high, series_[s].value[i]);
-      }
-    }
-    return std::ranges::all_of(group, [&](std::size_t s) {
-      return LargestGap(series_[s], points_, samples) <= kVisible * (high - low);
-    });
-  }
-
-  void WriteOpening(std::size_t samples, const std::string& prefix, const std::string& time,
-                    Record& record) const {
-    for (std::size_t s = 0; s < series_.size(); ++s) {
-      const TimeSeries thin = Thin(series_[s], points_, samples);
-      if (s == 0) record.Set(time, thin.t);
-      record.Set(prefix + keys_[s], thin.value);
-    }
-  }
-
-  int points_;
-  std::vector<std::string> keys_;             ///< "angle.crank", as their series
-  std::vector<std::size_t> angles_, shifts_;  ///< which series are
-  std::vector<TimeSeries> series_;
-};
-
-/// Corrections and cost of projections (levels without drift): the largest violation of points [m],
-/// its series, and Newton steps. Writes nothing at other levels.
-template <class Space>
-class CorrectionObserver final : public Observer<Space> {
- public:
-  void Observe(const Sample<Space>& sample) override {
-    if (TraitsOf(sample.formulation.options().enforcement).growth != DriftGrowth::kNone) return;
-    const Correction<double>& correction = sample.formulation.level().correction();
-    largest_ = std::max(largest_, correction.shift);
-    iterations_ += correction.iterations;
-    series_.Add(sample.t, correction.shift);
-  }
-
-  void Write(Record& record) const override {
-    if (series_.t.empty()) return;
-    record.Set("correction_max", largest_);
-    record.Set("projection_iterations", iterations_);
-  }
-
-  void Trace(Traces& traces) const override {
-    traces.correction = series_;
-    traces.projection_steps = iterations_;
-  }
-
- private:
-  double largest_ = 0.0;
-  std::int64_t iterations_ = 0;
-  TimeSeries series_;
-};
-
-/// The largest angular frequency [rad/s] of prescribed motions and of forces that are harmonic in
-/// time; 0 without any. Tables have knots, at which steps end.
-double FastestDrive(const MechanismDescription& description) {
-  double fastest = 0.0;
-  const auto look = [&](const TimeFunctionDescription& value) {
-    const auto* harmonic = std::get_if<Harmonic>(&value);
-    if (harmonic == nullptr || harmonic->amplitude == 0.0) return;
-    fastest = std::max(fastest, std::abs(harmonic->omega));
-  };
-  for (const JointDescription& joint : description.joints) {
-    for (const PrescribedMotion& motion : joint.motions) look(motion.value);
-  }
-  for (ForceDescription force : description.forces) {
-    if (const TimeFunctionDescription* value = PartsOf(force).value) look(*value);
-  }
-  return fastest;
-}
-
-/// Lengths of accepted steps, and the fastest prescribed function of time: an error estimate does
-/// not detect events between the points of a step. The shortest step excludes those clipped by a
-/// stop time or the end.
-template <class Space>
-class StepLengthObserver final : public Observer<Space> {
- public:
-  explicit StepLengthObserver(const Watched<Space>& run)
-      : stops_(run.stops.begin(), run.stops.end()), fastest_(FastestDrive(run.description)) {}
-
-  void Observe(const Sample<Space>& sample) override {
-    if (last_ > 0.0 && !std::ranges::binary_search(stops_, t_) &&
-        (shortest_ == 0.0 || last_ < shortest_)) {
-      shortest_ = last_;
-      shortest_t_ = t_;
-    }
-    last_ = sample.t - t_;
-    t_ = sample.t;
-    longest_ = std::max(longest_, last_);
-  }
-
-  void Write(Record& record) const override {
-    if (longest_ == 0.0) return;
-    record.Set("step_longest", longest_);
-    if (shortest_ > 0.0) {
-      record.Set("step_shortest", shortest_);
-      record.Set("step_shortest_t", shortest_t_);
-    }
-    if (fastest_ > 0.0) record.Set("drive_frequency", fastest_);
-  }
-
- private:
-  std::vector<double> stops_;    ///< [s], rising
-  double fastest_;               ///< [rad/s]
-  double t_ = 0.0, last_ = 0.0;  ///< of the last step, which the end may have clipped
-  double longest_ = 0.0, shortest_ = 0.0, shortest_t_ = 0.0;
-};
-
 }  // namespace
 
 template <class Space>
@@ -730,9 +534,7 @@ std::vector<std::unique_ptr<Observer<Space>>> MakeObservers(const Watched<Space>
   }
   all.push_back(std::make_unique<ExactObserver<Space>>(run));
   if (is_member) return all;
-  all.push_back(std::make_unique<CoordinateObserver<Space>>(run.points));
-  all.push_back(std::make_unique<CorrectionObserver<Space>>());
-  all.push_back(std::make_unique<StepLengthObserver<Space>>(run));
+  AddSeriesObservers(run, &all);
   for (const ObserverRow& row : RegisteredObservers()) all.push_back(row.Make(run));
   return all;
 }

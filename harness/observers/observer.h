@@ -23,8 +23,7 @@ struct TimeSeries {
   }
 };
 
-/// Returns every k-th of the first `samples` (default: all), with k such that at most `points` >= 2
-/// remain. Always includes the last one.
+/// Returns at most `points` >= 2 of the first `samples`, evenly, always with the last one.
 TimeSeries Thin(const TimeSeries& series, int points, std::size_t samples = SIZE_MAX);
 
 // Measurements along a run. Observers receive accepted steps only. Each keeps maxima and, for
@@ -79,8 +78,12 @@ template <class Space>
 std::vector<std::unique_ptr<Observer<Space>>> MakeObservers(const Watched<Space>& run,
                                                             bool is_member);
 
-/// The branch combinations at the positions of `kinematics` [rad]; in space up to whole turns of
-/// each body.
+/// Appends the observers of coordinates, corrections and step lengths (series.cpp).
+template <class Space>
+void AddSeriesObservers(const Watched<Space>& run,
+                        std::vector<std::unique_ptr<Observer<Space>>>* all);
+
+/// The branch combinations at `kinematics` [rad]; in space up to whole turns of each body.
 template <class Space>
 std::vector<double> BranchAt(const ObservedQuantities& problem,
                              const Kinematics<Space, double>& kinematics);

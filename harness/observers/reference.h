@@ -17,8 +17,7 @@
 
 namespace loopbench::harness {
 
-// State of a mechanism at one time in the user's terms, independent of preprocessing, and the
-// distance between two such snapshots.
+// States of a mechanism in the user's terms, independent of preprocessing, and their distance.
 
 /// Pose and velocity of a body, in the user's ground axes, at the body's origin.
 struct BodyState {
@@ -55,8 +54,7 @@ bool IsLength(const MechanismDescription& user, std::size_t joint);
 /// Origins, centres of mass and named points of all bodies but Ground.
 std::vector<MeasuredPoint> PointsOf(const MechanismDescription& user);
 
-/// Returns a snapshot with room for all bodies and joints: bodies fixed to Ground have their poses,
-/// all others are at the origin.
+/// Returns a snapshot of all bodies: those fixed to Ground at their poses, others at the origin.
 Snapshot EmptySnapshot(const Measured& measured);
 
 /// Returns the same state for one part's body, at its centre of mass in the part's ground axes.
@@ -169,8 +167,7 @@ std::filesystem::path ReferencePath(const std::filesystem::path& store_file, con
 
 void WriteReference(const std::filesystem::path& path, const std::string& id,
                     const MechanismDescription& user, const Reference& reference);
-/// Reads a reference; returns nothing without a file. Throws std::runtime_error, with the file's
-/// name, for a damaged or foreign file.
+/// Reads a reference, if there is a file. Throws std::runtime_error for a damaged or foreign one.
 std::optional<Reference> ReadReference(const std::filesystem::path& path, const std::string& id,
                                        const MechanismDescription& user);
 
@@ -219,8 +216,7 @@ std::unique_ptr<Meter> MakeMeter(const Measured& measured, int part, const Refer
 std::unique_ptr<Meter> MakeMeter(const Measured& measured, int part, const PublishedSeries& series,
                                  double horizon);
 
-/// Writes the reference's keys: reference, reference_runs, reference_error and
-/// reference_valid_until.
+/// Writes reference, reference_runs, reference_error and reference_valid_until.
 void WriteCertificate(const Reference& reference, Record& record);
 
 /// Writes the keys of the published data: reference, reference_runs (name and source),

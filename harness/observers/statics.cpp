@@ -17,8 +17,7 @@ using Eigen::VectorXd;
 /// A coordinate holds a motion in which it moves by more than this share of unit bodies' motions
 /// [rad, or lengths]. Smaller shares would need efforts of more than 1e4 times the loads.
 constexpr double kHolds = 1e-4;
-/// Power of applied forces that counts as zero, over the sum of its parts: permitted speeds are
-/// known to round-off over kRankRatio.
+/// Power that counts as zero, over the sum of its parts: speeds have round-off over kRankRatio.
 constexpr double kBalanced = 1e-10;
 
 template <class Space>

@@ -1,19 +1,9 @@
 #include "harness/observers/trajectory.h"
 
-#include <fmt/format.h>
-
-#include <algorithm>
 #include <cerrno>
-#include <charconv>
 #include <cmath>
-#include <fstream>
-#include <functional>
 #include <limits>
-#include <memory>
 #include <set>
-#include <stdexcept>
-#include <string_view>
-#include <utility>
 
 #include "harness/base/json_document.h"
 #include "harness/base/record.h"
@@ -71,11 +61,7 @@ std::optional<double> NumberIn(std::string_view cell) {
   cell = Trimmed(cell);
   if (cell.empty()) return kNaN;
   if (cell.front() == '+') cell.remove_prefix(1);
-  double value = 0.0;
-  const auto [end, error] = std::from_chars(cell.data(), cell.data() + cell.size(), value);
-  // values beyond the range of doubles are rejected
-  if (end != cell.data() + cell.size() || error != std::errc()) return std::nullopt;
-  return value;
+  return WholeNumber<double>(cell);  // none beyond the range of doubles
 }
 
 }  // namespace
@@ -222,8 +208,9 @@ std::filesystem::path TrajectoryPath(const std::filesystem::path& store_file,
 }
 TrajectoryWriter::TrajectoryWriter(const std::filesystem::path& path,
                                    const std::vector<TrajectoryColumn>& columns,
-                                   const std::vector<std::string>& notes, TrajectoryFormat format)
-    : file_(path, Onto::kNoInput, kPart), format_(format) {
+                                   const std::vector<std::string>& notes, TrajectoryFormat format,
+                                   Onto onto)
+    : file_(path, onto, kPart), format_(format) {
   buffer_.reserve(kBuffer);
   if (format_ == TrajectoryFormat::kJsonLines) {
     for (const TrajectoryColumn& column : columns) labels_.push_back(Json(column.Label()).dump());
@@ -286,11 +273,9 @@ void RemovePart(const std::filesystem::path& path) {
 void RemoveParts(const std::filesystem::path& store_file) {
   std::error_code error;
   const std::filesystem::path folder = TrajectoryPath(store_file, "any").parent_path();
-  std::vector<std::filesystem::path> parts;
-  for (const auto& entry : std::filesystem::directory_iterator(folder, error)) {
-    if (entry.path().extension() == kPart) parts.push_back(entry.path());
+  for (const auto& entry : EntriesOf(folder)) {
+    if (entry.extension() == kPart) std::filesystem::remove(entry, error);
   }
-  for (const auto& part : parts) std::filesystem::remove(part, error);
 }
 
 std::filesystem::path TrajectoryOf(const Record& record, const std::filesystem::path& store_file) {
@@ -298,21 +283,6 @@ std::filesystem::path TrajectoryOf(const Record& record, const std::filesystem::
   if (name.empty() || name.extension() != ".csv" || name.filename() != name) return {};
   return TrajectoryPath(store_file, name.stem().string());
 }
-
-namespace {
-
-/// Reads a file of any size in blocks.
-void ForEachBlock(const std::filesystem::path& file,
-                  const std::function<void(std::string_view)>& use) {
-  std::ifstream in(file, std::ios::binary);
-  std::string block(kBuffer, '\0');
-  while (in.read(block.data(), static_cast<std::streamsize>(block.size())) || in.gcount() > 0) {
-    use(std::string_view(block).substr(0, static_cast<std::size_t>(in.gcount())));
-  }
-  if (!in.eof()) FailOn("read", file);
-}
-
-}  // namespace
 
 void VerifyTrajectory(const Record& record, const std::filesystem::path& file) {
   const std::string expected = record.Text("trajectory_hash");
@@ -369,6 +339,9 @@ std::string_view HowOf(const OutputOptions& output) {
 
 constexpr const char* kOpen =
     "nan, because redundant constraints share a load in no one way, in {} of {} rows: {}";
+constexpr const char* kRegularized =
+    "reactions, drives and couplings: nan in {} of {} rows, from {:.6g} s to {:.6g} s, because "
+    "constraints of a driven mechanism are regularized near a singular configuration";
 
 }  // namespace
 
@@ -408,6 +381,13 @@ template <class Space>
 void Recorder<Space>::Take(double t, const System<Space, double>& system, bool has_accelerations,
                            std::span<const double> work) {
   const Kinematics<Space, double>& kinematics = system.kinematics();
+  moment_.is_regularized = task_.output.Has(OutputPart::kReactions) && has_accelerations &&
+                           !system.mechanism().drives().empty() && system.IsSingular();
+  if (moment_.is_regularized) {
+    has_accelerations = false;
+    if (regularized_rows_++ == 0) first_regularized_t_ = t;
+    last_regularized_t_ = t;
+  }
   std::span<const Acceleration<Space, double>> accelerations;
   if (has_accelerations) {
     dynamics_.BodyAccelerations(kinematics, system.udot(), A_);
@@ -432,7 +412,9 @@ void Recorder<Space>::Take(double t, const System<Space, double>& system, bool h
   }
   lower_.reset();
   rows_->Write(moment_, &row_);
-  if (!file_) file_.emplace(task_.path, rows_->columns(), Notes());
+  if (!file_) {
+    file_.emplace(task_.path, rows_->columns(), Notes(), TrajectoryFormat::kCsv, Onto::kAnyFile);
+  }
   file_->Write(row_);
 }
 
@@ -459,11 +441,13 @@ std::vector<std::string> Recorder<Space>::Notes() const {
 
 template <class Space>
 void Recorder<Space>::Finish(Record& record) {
-  if (!file_) file_.emplace(task_.path, rows_->columns(), Notes());
+  if (!file_) {
+    file_.emplace(task_.path, rows_->columns(), Notes(), TrajectoryFormat::kCsv, Onto::kAnyFile);
+  }
   const std::int64_t rows = file_->rows();
   // columns without a value in equally many rows share a line
   std::vector<std::string> notes;
-  std::int64_t open = 0;
+  std::int64_t open = rows_->OpenByRegularization();
   const auto columns = rows_->Open();
   for (auto at = columns.begin(); at != columns.end();) {
     const auto end = std::find_if(at, columns.end(),
@@ -475,6 +459,10 @@ void Recorder<Space>::Finish(Record& record) {
     }
     notes.push_back(fmt::format(kOpen, at->second, rows, labels));
     at = end;
+  }
+  if (regularized_rows_ > 0) {
+    notes.push_back(fmt::format(kRegularized, regularized_rows_, rows, first_regularized_t_,
+                                last_regularized_t_));
   }
   const std::string hash = file_->Finish(notes);
   record.Set("trajectory", task_.path.filename().string());

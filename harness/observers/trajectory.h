@@ -50,8 +50,7 @@ struct BodyMotion {
 /// Returns all bodies at rest at the origin; bodies merged with Ground have their fixed pose.
 std::vector<BodyMotion> AtRest(const Compiled& compiled);
 
-/// Sets all bodies of one part. `accelerations` are given at the centres of mass, by the part's
-/// body. If empty, accelerations become NaN.
+/// Sets all bodies of one part. `accelerations`: at the centres of mass; if empty, NaN.
 template <class Space>
 void EnterPart(const Compiled& compiled, int part, const Kinematics<Space, double>& kinematics,
                std::span<const Acceleration<Space, double>> accelerations,
@@ -81,8 +80,7 @@ class UserMechanism {
   const Mechanism<Space, double>& mechanism() const { return mechanism_; }
   const Kinematics<Space, double>& kinematics() const { return kinematics_; }
 
-  /// Computes coordinates (a spatial angle as the principal value) and speeds of a joint, including
-  /// prescribed ones; at most seven and six.
+  /// Computes at most seven coordinates (a spatial angle's principal value) and six speeds.
   void Measure(int joint, double* q, double* u) const;
   /// Returns the direction of the i-th speed of a joint, prescribed or not, at the joint's point.
   const Direction<Space, double>& DirectionOfSpeed(int joint, int i) const;
@@ -137,6 +135,7 @@ struct RunSample {
   /// By the user's joint: its coordinate with full turns if the run integrates it, else NaN.
   std::vector<double> followed;
   double supplied = 0.0, dissipated = 0.0;  ///< work since the start [J]; NaN if unknown
+  bool is_regularized = false;  ///< without accelerations: they would be of the regularization
 };
 
 class RowWriter {
@@ -148,7 +147,9 @@ class RowWriter {
   /// closest to the last row, or to a followed coordinate.
   virtual void Write(const RunSample& moment, std::vector<double>* row) = 0;
   /// Returns labels of reactions and drives that were not unique so far, with the number of rows.
+  /// Rows of regularized samples do not count; OpenByRegularization() is their number of values.
   virtual std::vector<std::pair<std::string, std::int64_t>> Open() const = 0;
+  virtual std::int64_t OpenByRegularization() const = 0;
 };
 
 /// Makes a writer for planar or spatial mechanisms. The arguments must outlive it.
@@ -205,8 +206,7 @@ struct Trajectory {
 };
 Trajectory ReadTrajectory(const std::filesystem::path& path);
 
-/// Returns the column with this name as written in labels: LabelName(), for points and couplings
-/// two with a colon between them.
+/// Returns the column with this name by LabelName(), of points and couplings two with a colon.
 std::optional<std::size_t> FindColumn(const std::vector<TrajectoryColumn>& columns,
                                       std::string_view kind, std::string_view name,
                                       std::string_view component);
@@ -238,7 +238,7 @@ class TrajectoryWriter {
   /// std::runtime_error on system errors.
   TrajectoryWriter(const std::filesystem::path& path, const std::vector<TrajectoryColumn>& columns,
                    const std::vector<std::string>& notes,
-                   TrajectoryFormat format = TrajectoryFormat::kCsv);
+                   TrajectoryFormat format = TrajectoryFormat::kCsv, Onto onto = Onto::kNoInput);
   TrajectoryWriter(const TrajectoryWriter&) = delete;
   TrajectoryWriter& operator=(const TrajectoryWriter&) = delete;
 
@@ -261,8 +261,7 @@ class TrajectoryWriter {
   std::int64_t rows_ = 0;
 };
 
-/// Removes unfinished parts of killed runs from the trajectory folder next to a store's `file`, or
-/// the part of one `path`.
+/// Removes parts of killed runs: all next to a store's `file`, or the part of one `path`.
 void RemoveParts(const std::filesystem::path& store_file);
 void RemovePart(const std::filesystem::path& path);
 
@@ -276,8 +275,7 @@ class ChangedFile : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// Throws ChangedFile unless the file has the "trajectory_hash" of its record, or the record has
-/// none (version 1.0).
+/// Throws ChangedFile if the record (since 1.1) has another "trajectory_hash".
 void VerifyTrajectory(const Record& record, const std::filesystem::path& file);
 
 /// Copies each trajectory of `records` completely from the first of `stores` that has it to the
@@ -293,8 +291,7 @@ struct TrajectoryTask {
   std::string title;  ///< title of the case
 };
 
-/// Converts integrator states into trajectory rows of the user's mechanism, which runs as one part;
-/// never used inside a right-hand side.
+/// Converts integrator states into trajectory rows of the user's mechanism, which is one part.
 template <class Space>
 class Recorder {
  public:
@@ -303,8 +300,7 @@ class Recorder {
            const Mechanism<Space, double>& mechanism, const TrajectoryTask& task);
 
   /// Writes a row for an integrator state at a step end or between steps. The state contains
-  /// positions, speeds, and works if integrated. `lower` has a larger interpolation error, or is
-  /// the same state.
+  /// positions, speeds, and works if integrated. `lower`: a less exact one or the same.
   void TakeAt(double t, System<Space, double>& system, std::span<const double> y,
               std::span<const double> lower);
   /// Writes a row from the evaluated state of `system`; known accelerations are its udot(). `work`
@@ -328,6 +324,8 @@ class Recorder {
   std::vector<double> ydot_;
   std::vector<MeasuredPoint> points_;  ///< points for comparing interpolation degrees
   double interpolation_ = 0.0;         ///< [m]
+  std::int64_t regularized_rows_ = 0;  ///< of a driven mechanism: without reactions
+  double first_regularized_t_ = 0.0, last_regularized_t_ = 0.0;  ///< their times [s]
   std::unique_ptr<RowWriter> rows_;
   std::optional<TrajectoryWriter> file_;  ///< opened with the first row
   std::vector<double> row_;
@@ -366,8 +364,7 @@ struct TrajectoryCheck {
   LargestAt energy;                ///< change of kinetic + potential - supplied + dissipated [J]
   double kinetic = 0.0;            ///< largest [J]
   std::string no_energy;           ///< reason why the energy is unknown; or empty
-  /// Kinetic and potential energy of the file minus energies of the mechanism [J]; unknown without
-  /// speeds.
+  /// Energies of the file minus energies of the mechanism [J]; unknown without speeds.
   std::array<ColumnCheck, 2> energies;
   std::vector<std::string> unchecked;  ///< labels of forces, reactions and work
   /// Mean speed over two steps by the parabola through three speeds (Simpson's rule), minus the
@@ -399,8 +396,7 @@ double ValueAt(const Trajectory& ours, std::size_t column, double t, bool* is_be
 /// Returns the time of the first row that ValueAt() uses at a time within the trajectory.
 double FirstTimeFor(const Trajectory& ours, double t);
 
-/// Returns `theirs` minus `ours` at the times of `theirs`, angles modulo full turns; NaN outside
-/// `ours`.
+/// Returns `theirs` minus `ours` at times of `theirs`, angles modulo turns; NaN outside `ours`.
 std::vector<double> Differences(const Trajectory& ours, const Trajectory& theirs,
                                 const SharedColumn& column);
 

@@ -6,12 +6,7 @@
 #include <limits>
 #include <map>
 #include <numbers>
-#include <optional>
 #include <ranges>
-#include <span>
-#include <stdexcept>
-#include <string>
-#include <utility>
 
 #include "harness/observers/trajectory.h"
 

@@ -1,7 +1,5 @@
 // The user's mechanism at given motions of its bodies, and labels of columns.
-#include <fmt/format.h>
 
-#include <algorithm>
 #include <cmath>
 
 #include "harness/base/text.h"

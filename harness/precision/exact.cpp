@@ -1,8 +1,5 @@
 #include "harness/precision/exact.h"
 
-#include <fmt/format.h>
-
-#include <algorithm>
 #include <cmath>
 #include <concepts>
 #include <limits>
@@ -238,8 +235,7 @@ void Keep(System<Space, S>& system, S t, const std::vector<S>& y, Witness<Space,
       {kinematics.poses(), kinematics.motions(), ComputeEnergy(kinematics).total()});
 }
 
-/// Follows the motion by Gragg's method without regularization. Steps end at the times, and at
-/// knots of prescribed motions or tables.
+/// Follows the motion by Gragg's method without regularization. Steps end at times and knots.
 ///
 /// With projection at steps alone, a stretch between two times that needs ten times as many steps
 /// as any before, and a thousand more, ends the integration: it contains a singular configuration.

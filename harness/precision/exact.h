@@ -30,8 +30,7 @@ ClosedStart<Space, S> CloseStart(const MechanismDescription& description);
 /// A mechanism in the widest scalar: its initial state, and the reference for all runs' states.
 class Exact {
  public:
-  /// Assembles the start in double and closes its loops in Float128: positions, then speeds, by the
-  /// projection of level `projection`.
+  /// Closes the start in Float128 as CloseStart() does.
   Exact(const MechanismDescription& description, Coordinates coordinates);
 
   Outcome outcome() const { return outcome_; }  ///< of the start

@@ -1,6 +1,5 @@
 #include "harness/precision/integrator.h"
 
-#include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>

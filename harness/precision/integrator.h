@@ -28,8 +28,7 @@ struct Problem {
   int size = 0;
   /// Writes f(t, y); anything but kFinished ends the run. Values that are not finite do so too.
   std::function<Outcome(S t, std::span<const S> y, std::span<S> ydot)> derivative;
-  /// Called with the start and with every accepted step. Returns true if it has changed y, so that
-  /// f must be evaluated again.
+  /// Called at the start and every accepted step. Returns true if it has changed y.
   std::function<bool(S t, std::span<S> y)> accept;
 };
 

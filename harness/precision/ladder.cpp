@@ -2,8 +2,6 @@
 
 #include <cmath>
 #include <limits>
-#include <memory>
-#include <stdexcept>
 
 #include "harness/base/text.h"
 #include "harness/precision/exact.h"
@@ -133,8 +131,7 @@ void Judge(std::vector<SweepLevel>& rungs) {
       own.drift_ruled_by = DominatedBy(own.drift, other->drift);
       continue;
     }
-    // no wider scalar: its round-off is estimated from the narrower one by the ratio of eps, within
-    // a random walk's scatter
+    // no wider scalar: round-off from the narrower one by the ratio of eps, within a walk's scatter
     const double walk = 10 * Epsilon(own.scalar) / Epsilon(other->scalar);
     if (own.error > walk * other->error) own.error_ruled_by = "truncation";
     if (own.drift > walk * other->drift) own.drift_ruled_by = "truncation";

@@ -11,8 +11,7 @@
 namespace loopbench::harness {
 namespace {
 
-/// Returns the distance of the user's points from the centres of mass of their bodies [m]: converts
-/// bounds of orientations to bounds of points.
+/// Returns the largest distance of the user's points from the centres of mass of their bodies [m].
 double LongestArm(const Measured& measured) {
   double longest = 0.0;
   for (const auto& [body, at] : PointsOf(measured.user)) {
@@ -26,8 +25,7 @@ double LongestArm(const Measured& measured) {
   return longest;
 }
 
-/// Returns the bound of errors from storage in double, for a subsystem's snapshots with points at
-/// `arm` from the centres.
+/// Returns the bound with storage in double, for points at `arm` from the centres.
 template <class S>
 Distance InUsersTerms(const WideDistance<S>& wide, double arm, const Snapshot& kept) {
   constexpr double kEps = std::numeric_limits<double>::epsilon();

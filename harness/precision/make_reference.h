@@ -19,12 +19,10 @@ namespace loopbench::harness {
 /// "" or why there can be no reference of this mechanism in that scalar, as a sentence's end.
 std::string WhyNoReference(const MechanismDescription& user, const ReferenceOptions& options);
 
-/// Methods tried: the cheapest first; another, which gets further, if the first is not certified to
-/// the end.
+/// Methods tried: the cheapest, then one that gets further if the first ends early.
 enum class WaysTried { kAll, kCheapest, kFurthest };
 
-/// Returns the reference of a user's mechanism from 0 to `horizon` [s]. kCertifiedShare is relative
-/// to `length` [m].
+/// Returns the reference from 0 to `horizon` [s]. kCertifiedShare is relative to `length` [m].
 Reference MakeReference(const MechanismDescription& user, double horizon, double length,
                         const ReferenceOptions& options, WaysTried tried = WaysTried::kAll);
 

@@ -3,16 +3,12 @@
 // A JSON file defines the measurements; they are registered at run time. The library's JSON writer
 // prints NaN, which JSON readers reject: runs pass through SafeReporter first.
 #include <benchmark/benchmark.h>
-#include <fmt/format.h>
 
 #include <cctype>
-#include <charconv>
 #include <cmath>
 #include <cstdlib>
-#include <ctime>
 #include <fstream>
 #include <map>
-#include <optional>
 #include <sstream>
 
 #include "harness/base/text.h"
@@ -268,10 +264,8 @@ void RequireSeconds(const std::vector<char*>& arguments, const std::string& name
   const std::string text = LibraryOption(arguments, name);
   if (text.empty()) return;
   constexpr double kLongest = 1e6;
-  double seconds = 0.0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), seconds);
-  const bool is_number = error == std::errc() && end == text.data() + text.size();
-  if (is_number && seconds >= 0.0 && seconds <= kLongest) return;
+  const auto seconds = WholeNumber<double>(text);
+  if (seconds && *seconds >= 0.0 && *seconds <= kLongest) return;
   throw std::runtime_error(
       fmt::format("--{}: found \"{}\", expected seconds from 0 to {}", name, text, kLongest));
 }

@@ -1,5 +1,3 @@
-#include <algorithm>
-
 #include "harness/base/text.h"
 #include "harness/run/run.h"
 

@@ -1,15 +1,10 @@
-// loopbench_count: exact costs of right-hand sides, for gates that a noisy machine must not
-// disturb.
+// loopbench_count: exact costs of right-hand sides, independent of the machine's load.
 //
 // Operations, allocations and hashes are counted here; instructions by Callgrind, which runs this
-// program and dumps its counters each time CountedEvaluations returns: one file per case, in the
-// order of the cases. A second run of this program reads them into the records. tools/baseline has
-// the two commands.
-#include <fmt/format.h>
+// program and dumps its counters each time CountedEvaluations returns: one file per case, in their
+// order. A second run of this program reads them into the records (tools/baseline).
 
 #include <CLI/CLI.hpp>
-#include <algorithm>
-#include <filesystem>
 
 #include "harness/base/numeric_option.h"
 #include "harness/base/text.h"

@@ -1,12 +1,7 @@
-#include <fmt/format.h>
-
-#include <algorithm>
 #include <array>
 #include <cmath>
 #include <numbers>
 #include <random>
-#include <string_view>
-#include <utility>
 
 #include "harness/base/text.h"
 #include "harness/run/run.h"
@@ -15,8 +10,7 @@
 namespace loopbench::harness {
 namespace {
 
-/// Returns the sum of a key over the parts that have it; NaN if one of `all` lacks it; nothing if
-/// no part has it.
+/// Returns the sum of a key over the parts; NaN if one of `all` lacks it; nothing if none has it.
 Value Sum(std::span<const Run> parts, std::string_view key, bool all) {
   std::int64_t count = 0;
   double sum = 0.0;
@@ -34,8 +28,7 @@ Value Sum(std::span<const Run> parts, std::string_view key, bool all) {
   return is_count ? Value(count) : Value(sum);
 }
 
-/// Returns the part that decides a key: the part with the largest or smallest number, the first
-/// that failed, ...; null if no part has the key.
+/// Returns the part that decides a key, or null: the largest number, the first that failed, ...
 const Run* Deciding(std::span<const Run> parts, const Measure& measure, std::string_view key) {
   const auto& [how, with] = measure.merging;
   if (how == Merge::kWith) return Deciding(parts, *FindMeasure(with), with);

@@ -100,8 +100,7 @@ void RunInProcesses(std::size_t count, int jobs,
 /// Runs `work` alone in the same way.
 ProcessResult RunInProcess(const ProcessLimits& limits, const std::function<std::string()>& work);
 
-/// Returns the table outcome of a piece without an answer: "crashed", "process-time-limit" or
-/// "memory-limit".
+/// Returns the outcome without an answer: "crashed", "process-time-limit" or "memory-limit".
 std::string_view OutcomeOf(ProcessEnding ending);
 
 /// Returns true if memory limits are set in this build.

@@ -31,13 +31,11 @@ namespace loopbench::harness {
 
 struct SimplifiedProblem {
   Compiled compiled;
-  /// Names and angles refer to the simplified bodies. Problems with known angles are never split,
-  /// so this belongs to the only part.
+  /// With names and angles of simplified bodies: problems with known angles are never split.
   ObservedQuantities observe;
 };
 
-/// Angles of the known solution are measured about the user's z: such a problem is not split, and a
-/// spatial one stays spatial.
+/// Problems with known angles, about the user's z, are not split, and spatial ones stay spatial.
 SimplifiedProblem SimplifyProblem(const MechanismDescription& description,
                                   const ObservedQuantities& observe, CompileOptions options);
 
@@ -64,8 +62,7 @@ std::string AccuracyContent(const Experiment& experiment, const Case& entry);
 std::string ProblemTimingContent(const Experiment& experiment, const Case& entry);
 std::string FamilyTimingContent(const Experiment& experiment);
 
-/// Returns the content of all levels of a precision study. `rungs` names them all: the verdict on
-/// one depends on the others.
+/// Returns the content of a precision study's levels. `rungs` names all: verdicts depend on them.
 std::string LadderContent(const Experiment& experiment, const Case& entry,
                           const std::string& rungs);
 
@@ -154,8 +151,7 @@ std::unique_ptr<System<Space, double>> MakeFormulation(const Method& method,
                                  .beside = beside});
 }
 
-/// Gives a system, after its start, the Jacobians for the Newton iteration of a case: none for
-/// difference quotients or without iteration.
+/// Gives a system, after its start, Jacobians for Newton's iteration, unless by differences.
 template <class Space>
 void GiveJacobian(const std::string& integrator, JacobianKind kind,
                   const MechanismDescription& description, System<Space, double>& system) {
@@ -164,8 +160,7 @@ void GiveJacobian(const std::string& integrator, JacobianKind kind,
 }
 
 /// Gives a system, after its start and IntegrateWork(), the generated right-hand side of a method.
-/// `mechanism` as RecordingSubject has it. Stores NotCovered (harness/generate/record.h) as outcome
-/// and message of `result`.
+/// `mechanism` as RecordingSubject has it. Stores NotCovered as outcome of `result`.
 template <class Space>
 void GiveExecution(const Method& method, const MechanismDescription& description,
                    System<Space, double>& system, IntegratorResult* result,
@@ -188,8 +183,7 @@ void GiveExecution(const Method& method, const MechanismDescription& description
 /// Sets flops, numbers of operations by kind, and depth, as `loopbench count` has them.
 void SetOperations(const generate::MethodCounts& counts, Record& record);
 
-/// Records a method's right-hand side next to a start and sets its operations. Sets nothing if it
-/// cannot be recorded.
+/// Sets the operations of a method's right-hand side, recorded next to a start, if it can be.
 void WriteOperations(const Method& method, const MechanismDescription& description,
                      const Start<double>& start, Record& record);
 
@@ -203,8 +197,7 @@ template <class Space>
 void LimitSteps(const Case& entry, const Mechanism<Space, double>& mechanism,
                 IntegratorOptions* options);
 
-/// Returns the absolute tolerance of each component of a system's present state. Empty if all have
-/// the case's atol.
+/// Returns the absolute tolerance of each component of the state; empty for the case's atol.
 template <class Space>
 std::vector<double> AtolsOf(const Case& entry, const MechanismDescription& description,
                             const System<Space, double>& system) {
@@ -243,8 +236,7 @@ Record RunCase(const Experiment& experiment, const Case& entry,
                const Reference* reference = nullptr, const std::filesystem::path& trajectory = {},
                int threads = 1, SideBySide* beside = nullptr);
 
-// Short runs: detection of nearly constant coordinates (mechanism/simplify/model.h), and errors of
-// simplified models.
+// Short runs: nearly constant coordinates (simplify/model.h), errors of simplified models.
 
 /// Runs the description for `duration` seconds by O-DCA at level projection, ode45 at 1e-6, in
 /// joint coordinates. A run that ends earlier (its CPU time is limited to `cpu_s`) returns its data
@@ -283,8 +275,7 @@ using PeerFactory = std::function<std::unique_ptr<Peer>(const MechanismDescripti
 /// for a name that is no peer's or has one already.
 void RegisterPeer(const std::string& name, PeerFactory make);
 
-/// Returns null if the formulation is no external engine. Throws Inexpressible, and ConfigError for
-/// an engine that this build does not contain.
+/// Returns null without an engine. Throws Inexpressible, and ConfigError for a missing engine.
 std::unique_ptr<Peer> MakePeer(const std::string& formulation,
                                const MechanismDescription& description);
 

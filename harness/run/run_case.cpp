@@ -1,9 +1,5 @@
-#include <fmt/format.h>
-
-#include <algorithm>
 #include <cmath>
 #include <limits>
-#include <optional>
 
 #include "harness/base/text.h"
 #include "harness/observers/observer.h"
@@ -14,17 +10,13 @@ namespace loopbench::harness {
 
 IntegratorOptions OptionsOf(const Case& entry, const std::vector<double>& stop_times) {
   IntegratorOptions options;
+  static_cast<Integration&>(options) = entry.integration;
   options.profile = entry.integrator;
   options.fixed_step = entry.step;
   const bool is_fixed = entry.step > 0.0;
   options.rtol = is_fixed ? kToleranceOfFixedSteps : entry.rtol;
   options.atol = is_fixed ? kToleranceOfFixedSteps : entry.atol;
-  if (!is_fixed) {
-    options.max_step = entry.integration.max_step;
-    options.initial_step = entry.integration.initial_step;
-  }
-  options.max_newton_iterations = entry.integration.max_newton_iterations;
-  options.newton_coefficient = entry.integration.newton_coefficient;
+  if (is_fixed) options.max_step = options.initial_step = 0.0;
   options.step_limit = entry.limits.steps;
   options.time_limit_s = entry.limits.cpu_s;
   options.stop_times = stop_times;
@@ -38,8 +30,7 @@ void LimitSteps(const Case& entry, const Mechanism<Space, double>& mechanism,
   if (mechanism.drives().empty()) return;
   if (mechanism.coordinates() != Coordinates::kJoint || mechanism.num_u() == 0) return;
   if (mechanism.num_u() > mechanism.num_equations()) return;
-  // Methods of order five take 1.5 to 2 rtol^(1/6) rad a step where coordinates turn; twice that
-  // limits no others.
+  // Methods of order five take 1.5 to 2 rtol^(1/6) rad a step; twice that limits no others.
   constexpr double kTurn = 4.0;
   constexpr int kTimes = 64;
   Kinematics<Space, double> kinematics(mechanism);
@@ -90,8 +81,7 @@ void WriteOperations(const Method& method, const MechanismDescription& descripti
 
 namespace {
 
-/// Writes the outcome of the run and the integrator's counters. Newton steps of a projection count
-/// as evaluations, too.
+/// Writes outcome and counters. Newton steps of a projection count as evaluations, too.
 void WriteCounts(const IntegratorResult& result, std::int64_t projection_steps, bool is_implicit,
                  Record& record) {
   record.Set("outcome", std::string(ToString(result.outcome)));
@@ -232,8 +222,7 @@ class Runner {
     stops_.erase(std::unique(stops_.begin(), stops_.end()), stops_.end());
   }
 
-  /// Holds the state at the k-th time of the reference against it. `lower` is the same with more of
-  /// the interpolation's error in it.
+  /// Compares the state at the reference's k-th time. `lower`: with a larger interpolation error.
   void Compare(System<Space, double>& system, std::size_t k, std::span<const double> y,
                std::span<const double> lower) {
     const auto picture = [&](std::span<const double> state) {

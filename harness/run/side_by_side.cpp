@@ -1,12 +1,9 @@
-#include <algorithm>
 #include <atomic>
 #include <boost/context/fiber.hpp>
 #include <boost/context/protected_fixedsize_stack.hpp>
 #include <exception>
 #include <new>
-#include <system_error>
 #include <thread>
-#include <utility>
 
 #include "harness/base/text.h"
 #include "harness/run/run.h"
@@ -23,8 +20,7 @@ constexpr int kMost = 1;
 constexpr int kMost = kLanes;
 #endif
 
-/// Stacks start at different offsets within a page. Otherwise data used by all runs would compete
-/// for the same few sets of the nearest cache.
+/// Stacks start at different offsets within a page, to use all sets of the nearest cache.
 constexpr std::size_t kApart = 4096 / kLanes, kStackBytes = std::size_t{8} << 20;
 
 /// Stack that successive runs use.
@@ -68,8 +64,7 @@ class Place {
   context::fiber fiber_;
 };
 
-/// Runs of one thread, in as many places as there are lanes. A place whose run has ended takes the
-/// next one.
+/// Runs of one thread, in as many places as lanes. A place takes the next run when its run ends.
 class Places final : public SideBySide {
  public:
   /// `start(run)` is called in a place for each run that `next` gives, -1 being none.

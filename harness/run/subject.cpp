@@ -1,11 +1,5 @@
-#include <fmt/format.h>
-
-#include <algorithm>
-#include <charconv>
 #include <cmath>
-#include <optional>
 #include <sstream>
-#include <stdexcept>
 
 #include "harness/base/text.h"
 #include "harness/integrator/arkode.h"

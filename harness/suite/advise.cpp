@@ -1,10 +1,6 @@
 #include "harness/suite/advise.h"
 
-#include <fmt/format.h>
-
-#include <algorithm>
 #include <cmath>
-#include <stdexcept>
 
 #include "harness/base/text.h"
 #include "harness/config/formulations.h"
@@ -77,8 +73,7 @@ class BenchIn final : public TrialBench {
     Start<double> start;
   };
 
-  /// A run at the speed that the machine has when it is alone, or the fastest of some that were all
-  /// disturbed.
+  /// A run without other load on the machine, or the fastest of some disturbed ones.
   IntegratorResult RunBare(const Choice& choice, double cpu_s) {
     constexpr int kMaxDisturbed = 6;
     IntegratorResult fastest;
@@ -139,13 +134,11 @@ class BenchIn final : public TrialBench {
   Coordinated joint_, absolute_;
 };
 
-/// Tolerances that trials are made at. Below the least rounding rules, above the largest the error
-/// estimate means nothing.
+/// Tolerances of trials: between rounding and the largest useful error estimate.
 constexpr double kMinRtol = 3e-15, kLargestRtol = 0.05;
 /// For an error bound or a budget: target and lower limit of acceptance, as factors of the request.
 constexpr double kAim = 0.7, kContent = 0.4;
-/// Trials of one method and level. Errors follow tolerances by a power near one: three are enough
-/// in most cases.
+/// Trials of a method and level. Errors follow tolerances nearly linearly: three often suffice.
 constexpr int kMaxTrials = 5;
 /// A trial may cost so much more than the best, for timing's sake, and so much at least [s].
 constexpr double kRoom = 1.5, kMinLimit_s = 2e-4;
@@ -277,8 +270,7 @@ class Pilot {
     return std::min(left, std::max(kMinLimit_s, kRoom * best_->wall_s));
   }
 
-  /// Returns the limit for trials of a sweep: twenty times the best or the budget. Low orders at
-  /// 1e-13 would take hours.
+  /// Returns the limit for trials of a sweep, as low orders at 1e-13 would take hours.
   double LimitOfSweep() const {
     if (request_.budget) return std::max(kHopeless * Budget(), kHopelessLeast_s);
     return best_ ? std::max(kHopeless * best_->wall_s, kHopelessLeast_s) : request_.cpu_s / 10;
@@ -288,6 +280,7 @@ class Pilot {
   Trial Try(const Choice& choice, double limit) {
     Trial trial = bench_.Try(choice, limit);
     ++advice_.trials;
+    tried_.push_back(choice);
     if (request_.budget && trial.outcome == Outcome::kFinished) bench_.Settle(&trial);
     if (Keeps(trial) && (!best_ || Better(trial, *best_))) best_ = trial;
     return trial;
@@ -340,7 +333,7 @@ class Pilot {
       const Trial trial = Try(choice);
       if (!*best || Better(trial, **best)) *best = trial;
       const std::optional<Choice> other = (this->*next)(trial);
-      if (!other) return;
+      if (!other || Contains(tried_, *other)) return;
       choice = *other;
     }
   }
@@ -425,7 +418,7 @@ class Pilot {
   /// to the full budget.
   void SpendBudget(Trial* trial) {
     double order = kOrder;
-    for (int i = 0; i < kSqueezes && !OutOfTime(); ++i) {
+    for (int i = 0; i < kSqueezes && HasRun(*trial) && !OutOfTime(); ++i) {
       bench_.Settle(trial);
       const double used = trial->wall_s / Budget();
       if (used > kFull && used <= 1.0) return;
@@ -436,7 +429,7 @@ class Pilot {
         const double factor = std::clamp(std::pow(used / kSpent, order), 1e-5, 1e5);
         choice.rtol = Tolerance(choice.rtol * factor);
       }
-      if (choice == trial->choice) return;
+      if (Contains(tried_, choice)) return;
       const Trial next = Try(choice);
       const double longer = std::log(next.wall_s / trial->wall_s);
       if (std::abs(longer) < 0.02) return;
@@ -465,6 +458,7 @@ class Pilot {
   double begin_ = WallSeconds();  ///< [s]
   std::string fastest_;
   std::optional<Trial> best_;
+  std::vector<Choice> tried_;  ///< by searches and finalists
   Advice advice_;
 };
 

@@ -15,8 +15,7 @@
 
 namespace loopbench::harness {
 
-// Runs one mechanism with many methods, times each run, and measures its error against the
-// reference solution.
+// Runs one mechanism with many methods, times each run, and measures its error.
 
 /// A way of running a mechanism.
 struct Choice {
@@ -53,8 +52,7 @@ struct TrialProblem {
 class TrialBench {
  public:
   virtual ~TrialBench() = default;
-  /// Times a bare run and measures a second one. A run that takes more CPU time than `cpu_s` ends
-  /// with kTimeLimit and is not measured.
+  /// Times a bare run and measures a second one, unless it takes more CPU time than `cpu_s`.
   virtual Trial Try(const Choice& choice, double cpu_s) = 0;
   /// Another bare run: lowers the trial's wall_s if it was faster.
   virtual void Remeasure(Trial* trial) = 0;
@@ -69,8 +67,7 @@ std::unique_ptr<TrialBench> MakeTrialBench(const TrialProblem& problem);
 /// Returns a sentence that names the main source of a trial's error.
 std::string WhatLimits(const Trial& trial, double reference_error);
 
-// Finds the cheapest method that meets an error bound, or the most accurate method within a time
-// budget, by short trial runs.
+// Finds the cheapest method for an error bound, or the most accurate one for a time budget.
 //
 // Formulations compute the same accelerations. The search therefore chooses tolerances per method
 // and level in the fastest formulation. The best few then run with all formulations and both
@@ -91,8 +88,7 @@ struct Advice {
   std::vector<Trial> finalists;  ///< best first; nearest to the bound if none meets it
   /// The best trial of each method and level that the pilot looked at, in their order.
   std::vector<Trial> looked_at;
-  /// The fastest generated run with the first finalist's integrator, level and tolerance, if it was
-  /// requested and finished.
+  /// The fastest generated run with the first finalist's settings, if requested and finished.
   std::optional<Trial> generated;
   int trials = 0;
   int untried = 0;       ///< that a sweep's time left out

@@ -1,18 +1,13 @@
 #include "harness/suite/cluster.h"
 
-#include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include <algorithm>
 #include <cctype>
-#include <charconv>
 #include <cmath>
 #include <fstream>
 #include <limits>
 #include <set>
 #include <sstream>
-#include <stdexcept>
-#include <unordered_map>
 
 #include "harness/base/record.h"
 #include "harness/base/store.h"
@@ -149,8 +144,7 @@ std::string BatchHead(const ClusterRun& run, const std::string& name) {
   return head;
 }
 
-/// Returns the line that sets a job's output file. Slurm interprets quotes and backslashes as a
-/// shell does, and %X as job properties.
+/// Returns the line of a job's output file. Slurm interprets quotes, backslashes and %X.
 std::string OutputLine(const std::filesystem::path& folder, const std::string& name) {
   std::string quoted;
   for (const char c : folder.string()) {

@@ -58,8 +58,7 @@ ExperimentFiles FilesOf(const ClusterRun& run);
 /// or an experiment is named twice.
 void CountCases(ClusterRun* run);
 
-/// Writes cluster.json if there is none; else returns false and writes nothing. Of several
-/// concurrent callers exactly one succeeds.
+/// Writes cluster.json if there is none, else returns false. Of several callers one succeeds.
 bool MakeClusterRun(const ClusterRun& run, const std::filesystem::path& folder);
 void WriteClusterRun(const ClusterRun& run, const std::filesystem::path& folder);
 /// Throws ConfigError with file, key, found and expected value if it is missing or invalid.

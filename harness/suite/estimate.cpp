@@ -1,12 +1,9 @@
-#include <fmt/format.h>
-
 #include <cmath>
 #include <cstring>
 #include <exception>
 #include <numeric>
 #include <set>
 #include <sstream>
-#include <type_traits>
 
 #include "harness/base/text.h"
 #include "harness/judge/analysis.h"
@@ -70,8 +67,8 @@ std::string AnswerIn(const MechanismDescription& description) {
   const Start<double> start = Assemble<Space>(description, mechanism);
   if (start.outcome == Outcome::kInconsistentStart) return kFault + start.message;
   std::string lines;
-  for (const std::string& warning : FindGuessWarnings(description, start.q)) {
-    lines += warning + '\n';
+  for (const auto& find : {FindGuessWarnings, FindForceWarnings}) {
+    for (const std::string& warning : find(description, start.q)) lines += warning + '\n';
   }
   return lines;
 }
@@ -320,8 +317,7 @@ double Estimate::OfLadder(std::size_t experiment, const LadderGroup& group) {
                          : rate->fixed_s + std::min(rate->Running(1.0), runs * own.limits.cpu_s);
 }
 
-/// Estimates timings: simulations take as long as accuracy runs; right-hand sides of families have
-/// pilots of one batch.
+/// Simulations take as long as accuracy runs; right-hand sides of families have pilots.
 double Estimate::OfTiming(std::size_t experiment, const TimingGroup& group) {
   const Experiment& own = experiments_[experiment];
   const auto sum = [](const auto& rows, const auto& seconds) {

@@ -1,5 +1,3 @@
-#include <fmt/format.h>
-
 #include <cmath>
 #include <set>
 
@@ -305,9 +303,12 @@ void KeepMechanisms(const std::vector<Experiment>& experiments,
       const auto path = MechanismPath(store_file, Fnv1a(problem.mechanism.canonical));
       if (std::filesystem::exists(path)) continue;
       try {
-        WriteFileAtomically(path, WithOwnHash(MechanismText(
-                                      problem.mechanism.description, problem.mechanism.observe,
-                                      fmt::format("{}{}.", kChecksum, kZeros))));
+        // another process may have written it meanwhile
+        WriteFileAtomically(
+            path,
+            WithOwnHash(MechanismText(problem.mechanism.description, problem.mechanism.observe,
+                                      fmt::format("{}{}.", kChecksum, kZeros))),
+            Onto::kAnyFile);
       } catch (const ConfigError&) {
       }
     }
@@ -325,7 +326,7 @@ void CopyMechanisms(const std::vector<Record>& records,
       if (!std::filesystem::exists(from)) continue;
       const std::string text = ReadFile(from);
       if (WithOwnHash(text) != text) continue;
-      WriteFileAtomically(to, text);
+      WriteFileAtomically(to, text, Onto::kAnyFile);
       break;
     }
   }

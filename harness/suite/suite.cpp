@@ -1,10 +1,6 @@
 #include "harness/suite/suite.h"
 
-#include <fmt/format.h>
-
-#include <fstream>
 #include <sstream>
-#include <string_view>
 #include <unordered_set>
 
 #include "harness/base/text.h"
@@ -107,8 +103,7 @@ Piece LadderPiece(const Experiment& experiment, const LadderGroup& group) {
           fmt::format("{} {}", group.keys.front().Text("mechanism"), ToString(group.task.method))};
 }
 
-/// Returns the answers of pieces, side by side where they share calls: all records of each, one per
-/// line (child process).
+/// Returns the answers of pieces, side by side where they share calls: records in lines (child).
 std::vector<std::string> AnswersOf(const std::vector<Piece>& pieces,
                                    const std::vector<std::size_t>& asked) {
   std::vector<std::string> answers(asked.size());
@@ -403,8 +398,7 @@ class Group {
   std::unordered_set<std::string> dealt_;  ///< ids of the pieces of all shards
 };
 
-/// Returns the hash of the last bytes of the store before `end`, within a record with its checksum;
-/// "" if they cannot be read.
+/// Returns the hash of the last bytes of the store before `end`; "" if they cannot be read.
 std::string HashBefore(std::ifstream& store, std::uintmax_t end) {
   constexpr std::uintmax_t kLast = 512;
   const std::uintmax_t begin = end - std::min(end, kLast);
@@ -419,8 +413,7 @@ struct GroupMark {
   std::size_t records = 0, failed = 0;
 };
 
-/// Marks of completed groups of a long sweep, next to the store: a resumed run need not read a
-/// million combinations that are done.
+/// Marks of completed groups of a long sweep, next to the store, which a resumed run omits.
 ///
 /// A mark is a line of results.groups: content (Workload::content()), kind, group, number of
 /// records, number of unfinished runs, and state of the store. The state is its length and a hash

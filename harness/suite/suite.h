@@ -48,15 +48,13 @@ std::size_t CountRungs(const Experiment& experiment);
 /// exceeds these limits is not rejected here.
 void CheckLadders(const Experiment& experiment);
 
-/// Calls CheckLadders(). Without LOOPBENCH_PRECISIONS, throws ConfigError if the experiment has
-/// ladders.
+/// Calls CheckLadders(). Without LOOPBENCH_PRECISIONS, throws ConfigError for any ladder.
 void RequireLadders(const Experiment& experiment);
 
 /// Runs a ladder; returns one record per key, in order.
 std::vector<Record> ClimbTogether(const Experiment& experiment, const LadderGroup& group);
 
-/// Reference solution for the accuracy cases of a problem and horizon: a record, and a file next to
-/// the store if it is certified.
+/// Reference solution of a problem and horizon: a record, and a file if it is certified.
 struct ReferenceCase {
   std::size_t problem = 0;
   double horizon = 0.0;  ///< [s]
@@ -296,8 +294,7 @@ struct SuiteCount {
   std::size_t skipped = 0;                ///< cases already in the store
   std::size_t failed = 0;                 ///< new records with any outcome but "finished"
   std::size_t pieces = 0, processes = 0;  ///< number of new pieces; short pieces share processes
-  /// Ids of all requested cases, new or stored: by kind, then in the order of the experiments.
-  /// Empty after a long sweep.
+  /// Ids of all requested cases by kind and order in the experiments; empty after a long sweep.
   std::vector<std::string> ids;
 };
 
@@ -314,23 +311,19 @@ struct SuiteCount {
 SuiteCount RunSuite(Workload& workload, const SuiteOptions& options, FinishedRuns& finished,
                     ResultStore& store);
 
-// Files next to a store for later display of motions: the mechanisms of its problems, as files that
-// every command reads, and their references.
+// Files next to a store for later display of motions: mechanisms and references.
 
 /// Returns mechanisms/ID.json next to a store's `file`, where ID is the "problem_id" of the record;
 /// empty without an id, or for an id that no run writes.
 std::filesystem::path MechanismOf(const Record& record, const std::filesystem::path& store_file);
 
-/// Returns the text of such a file with the checksum of its other bytes in its comment; other texts
-/// stay.
+/// Returns the text of such a file with its checksum in its comment; other texts stay.
 std::string WithOwnHash(std::string text);
 
-/// Reads such a file. Throws ChangedFile (observers/trajectory.h) if its checksum is wrong, and
-/// as ReadMechanism().
+/// Reads such a file. Throws ChangedFile if its checksum is wrong, and as ReadMechanism().
 MechanismDescription ReadKeptMechanism(const std::filesystem::path& file);
 
-/// Throws ChangedFile if a mechanism or trajectory next to a store's `file` was changed after its
-/// run wrote it. Missing files are valid.
+/// Throws ChangedFile if a run's mechanism or trajectory file was changed. It may be missing.
 void VerifyFilesOf(const std::vector<Record>& records, const std::filesystem::path& store_file);
 
 /// Writes missing mechanism files for all problems with stored motion (references or trajectories).
@@ -341,8 +334,7 @@ void KeepMechanisms(const std::vector<Experiment>& experiments,
 /// Returns the reference of a record, next to the store's `file`; empty if it has none.
 std::filesystem::path ReferenceOf(const Record& record, const std::filesystem::path& store_file);
 
-/// Copies each mechanism of `records` completely from the first of `stores` that has it to the
-/// folder of `target`.
+/// Copies each mechanism of `records` from the first of `stores` that has it to `target`.
 void CopyMechanisms(const std::vector<Record>& records,
                     const std::vector<std::filesystem::path>& stores,
                     const std::filesystem::path& target);
@@ -352,8 +344,7 @@ void CopyMechanisms(const std::vector<Record>& records,
 /// Shows the running pieces from the start. Silent if standard error is no terminal.
 class Progress {
  public:
-  /// A piece of work: label and estimated duration [s]. NaN if unknown: the average of the other
-  /// pieces is used.
+  /// A piece of work: label and estimated duration [s]; NaN: the average of the others is used.
   struct Piece {
     std::string label;
     double estimate_s;

@@ -1,6 +1,3 @@
-#include <fmt/format.h>
-
-#include <charconv>
 #include <numeric>
 #include <set>
 
@@ -11,17 +8,12 @@
 namespace loopbench::harness {
 
 Shard ParseShard(const std::string& text) {
-  Shard shard;
-  const char* const end = text.data() + text.size();
-  const auto index = std::from_chars(text.data(), end, shard.index);
-  const bool has_count = index.ec == std::errc() && index.ptr != end && *index.ptr == '/';
-  const auto count = has_count ? std::from_chars(index.ptr + 1, end, shard.count) : index;
-  if (!has_count || count.ec != std::errc() || count.ptr != end || shard.index < 1 ||
-      shard.index > shard.count) {
+  const auto [index, count] = Quotient<int>(text);
+  if (index < 1 || index > count) {
     throw ConfigError(fmt::format("--shard: found \"{}\", expected k/n with 1 <= k <= n <= {}",
                                   text, std::numeric_limits<int>::max()));
   }
-  return shard;
+  return {*index, *count};
 }
 
 std::size_t RunsOf(const Case& entry) {
@@ -51,8 +43,7 @@ std::string KeysWithoutParameters(const Experiment& experiment) {
   return text;
 }
 
-/// A rule or filter for combinations that are alike: conditions on parameters, and the cases that
-/// meet the other conditions.
+/// A rule or filter: conditions on parameters, and the cases that meet the other conditions.
 struct SplitSelection {
   Selection on_axes;
   std::vector<bool> cases;

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "mechanism/algebra/factors.h"
+#include "mechanism/algebra/lanes.h"
 
 namespace loopbench {
 
@@ -32,22 +33,7 @@ class PivotedLu {
       return;
     }
     small_ = A;
-    for (int k = 0; k < size_; ++k) {
-      swaps_[k] = LargestFrom(k);
-      if (swaps_[k] != k) {
-        for (int j = 0; j < size_; ++j) std::swap(small_(k, j), small_(swaps_[k], j));
-      }
-      inverses_[k] = S(1) / small_(k, k);
-      S* L = &small_(0, k);
-      for (int i = k + 1; i < size_; ++i) L[i] *= inverses_[k];
-      for (int j = k + 1; j < size_; ++j) {
-        S* column = &small_(0, j);
-        if constexpr (std::is_same_v<S, double>) {
-          if (column[k] == 0.0) continue;  // in absolute coordinates most numbers are zero
-        }
-        for (int i = k + 1; i < size_; ++i) column[i] -= L[i] * column[k];
-      }
-    }
+    IsWide() ? Eliminate<true>() : Eliminate<false>();
   }
   /// The least pivot over the largest, each times its `scale` if there is one.
   S PivotRatio(const VectorX<S>* scale = nullptr) const {
@@ -75,7 +61,9 @@ class PivotedLu {
       large_.matrixLU().template triangularView<Eigen::Upper>().solveInPlace(x);
       return;
     }
-    for (Eigen::Index column = 0; column < x.cols(); ++column) SolveSmall(x.col(column).data());
+    for (Eigen::Index column = 0; column < x.cols(); ++column) {
+      IsWide() ? SolveSmall<true>(x.col(column).data()) : SolveSmall<false>(x.col(column).data());
+    }
   }
   /// x := A^-T x. No allocation.
   void SolveTransposed(Eigen::Ref<VectorX<S>> x) {
@@ -97,6 +85,38 @@ class PivotedLu {
   }
 
  private:
+  /// Returns true if lanes cost less than plain loops.
+  bool IsWide() const { return std::is_same_v<S, double> && size_ >= 2 * kLanes; }
+  template <bool kWide>
+  void Eliminate() {
+    for (int k = 0; k < size_; ++k) {
+      swaps_[k] = LargestFrom(k);
+      if (swaps_[k] != k) {
+        for (int j = 0; j < size_; ++j) std::swap(small_(k, j), small_(swaps_[k], j));
+      }
+      inverses_[k] = S(1) / small_(k, k);
+      S* L = &small_(0, k);
+      for (int i = k + 1; i < size_; ++i) L[i] *= inverses_[k];
+      for (int j = k + 1; j < size_; ++j) {
+        S* column = &small_(0, j);
+        if constexpr (std::is_same_v<S, double>) {
+          if (column[k] == 0.0) continue;  // in absolute coordinates most numbers are zero
+        }
+        Subtract<kWide>(L, column[k], k + 1, size_, column);
+      }
+    }
+  }
+  /// y -= a times a factor, for numbers from `first` to before `end`; with the same bits in lanes.
+  template <bool kWide>
+  static void Subtract(const S* a, const S& factor, int first, int end, S* y) {
+    int i = first;
+    if constexpr (kWide && std::is_same_v<S, double>) {
+      for (const S same = factor; i + kLanes <= end; i += kLanes) {
+        Store(Load<Lanes>(y + i) - Load<Lanes>(a + i) * same, y + i);
+      }
+    }
+    for (; i < end; ++i) y[i] -= a[i] * factor;
+  }
   int LargestFrom(int k) const {
     using std::abs;
     int row = k;
@@ -105,16 +125,23 @@ class PivotedLu {
     }
     return row;
   }
+  template <bool kWide>
   void SolveSmall(S* x) const {
     for (int k = 0; k < size_; ++k) std::swap(x[k], x[swaps_[k]]);
     for (int k = 0; k < size_; ++k) {
       const S* L = &small_(0, k);
-      for (int i = k + 1; i < size_; ++i) x[i] -= L[i] * x[k];
+      if constexpr (kWide) {
+        if (x[k] == S(0)) continue;  // as above
+      }
+      Subtract<kWide>(L, x[k], k + 1, size_, x);
     }
     for (int k = size_ - 1; k >= 0; --k) {
       const S* U = &small_(0, k);
       x[k] *= inverses_[k];
-      for (int i = 0; i < k; ++i) x[i] -= U[i] * x[k];
+      if constexpr (kWide) {
+        if (x[k] == S(0)) continue;
+      }
+      Subtract<kWide>(U, x[k], 0, k, x);
     }
   }
 

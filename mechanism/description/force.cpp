@@ -78,6 +78,19 @@ const std::deque<ForceDescription>& ForceKinds() { return Kinds(); }
 
 void AddForceKind(OtherForce force) { Kinds().push_back(std::move(force)); }
 
+double TensionAtZeroLength(const SpringDamper& spring) {
+  const double pull = spring.stiffness * spring.length, tension = spring.preload - pull;
+  constexpr double kRoundOff = 1e-12;
+  return std::abs(tension) <= kRoundOff * (std::abs(spring.preload) + pull) ? 0.0 : tension;
+}
+
+std::string NameOfForce(const MechanismDescription& description, std::size_t force) {
+  ForceDescription named = description.forces[force];
+  const ForceParts parts = PartsOf(named);
+  const auto body = [&](std::size_t i) { return description.bodies[parts.points[i]->body].name; };
+  return std::string(parts.name) + " between " + body(0) + " and " + body(1);
+}
+
 std::string ValidateForce(const MechanismDescription& description, ForceDescription force) {
   const ForceParts parts = PartsOf(force);
   const std::string error = Validator(description).Check(parts);

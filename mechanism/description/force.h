@@ -213,7 +213,17 @@ const std::deque<ForceDescription>& ForceKinds();
 /// Adds a kind. Programs call RegisterForce() instead: a kind needs an element too.
 void AddForceKind(OtherForce force);
 
+/// Distance of the two points of a force over Mechanism::length() below which they coincide.
+inline constexpr double kCoincident = 1e-9;
+
+/// Returns the tension [N] of a spring whose length approaches zero slowly. Unless it is zero, the
+/// force jumps where the points coincide, because it has no direction there.
+double TensionAtZeroLength(const SpringDamper& spring);
+
 struct MechanismDescription;
+/// Returns the name of a force between two points, for messages: its kind and bodies.
+std::string NameOfForce(const MechanismDescription& description, std::size_t force);
+
 /// Returns "" or the reason why a force is invalid: joints with several coordinates, points of no
 /// body or of Ground, negative numbers, parts out of the plane, non-finite numbers.
 std::string ValidateForce(const MechanismDescription& description, ForceDescription force);

@@ -31,6 +31,9 @@
 
 namespace loopbench {
 
+template <class Space, class S>
+class SelfStress;
+
 /// Diagnostics of Factor().
 struct Conditioning {
   int rank = 0;                  ///< independent loop constraints: rank of J in joint coordinates
@@ -147,6 +150,14 @@ class ConstraintSolver {
 
   /// Returns the solver's additional counters; counts of work start at Factor().
   virtual std::vector<NamedCount> Counters() const { return {}; }
+
+  /// Fast path for accelerations with redundant constraints whose share is missing (self_stress.h):
+  /// Accelerate(), then the solution for the share of its accelerations, added.
+  virtual bool AccelerateWithShare(const Kinematics<Space, S>& /*kinematics*/,
+                                   const VectorX<S>& /*feedback*/, SelfStress<Space, S>& /*stress*/,
+                                   VectorX<S>& /*udot*/, VectorX<S>* /*lambda*/) {
+    return false;
+  }
 
   const Conditioning& conditioning() const { return conditioning_; }
 

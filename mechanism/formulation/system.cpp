@@ -128,6 +128,10 @@ void System<Space, S>::SolveFormed(VectorX<S>* lambda) {
 
 template <class Space, class S>
 void System<Space, S>::SolveAccelerations(VectorX<S>* lambda) {
+  if (shares_ && carried_ == nullptr &&
+      solver_->AccelerateWithShare(kinematics(), *feedback_, *state_.stress(), udot_, lambda)) {
+    return;
+  }
   if (!solver_->Accelerate(kinematics(), *feedback_, udot_, lambda)) SolveFormed(lambda);
   if (carried_ != nullptr) {
     VectorX<S>* multiplier_change = lambda != nullptr ? &lambda_change_ : nullptr;

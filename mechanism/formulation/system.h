@@ -133,6 +133,9 @@ class System final : public Ode<S> {
   /// More of the outcome of the last evaluation, for messages: configuration and cure; may be "".
   std::string Why() const;
 
+  /// Returns true if usually independent constraints are dependent here and regularized.
+  bool IsSingular() const;
+
  private:
   /// Returns true if a solver may have a fast path for the right-hand side.
   bool MayTakeShortCut() const;
@@ -149,8 +152,6 @@ class System final : public Ode<S> {
   /// Judges the latter. At level projection, whose accepted steps satisfy the constraints, inertia
   /// carries a mechanism across singular configurations; violations at trial stages are not judged.
   Outcome JudgeDrives();
-  /// Returns true if usually independent constraints are dependent.
-  bool IsSingular() const;
   int FirmRank(const Kinematics<Space, S>& at) const;
   void NoteRankAhead();
   /// Below level projection, at an accepted step: whether closure errors decide the branch.

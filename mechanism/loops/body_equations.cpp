@@ -12,6 +12,7 @@ BodyEquations<Space, S>::BodyEquations(const Mechanism<Space, S>& mechanism)
       wrenches_(mechanism.num_bodies(), Wrench<Space, S>::Zero()),
       b_(mechanism.num_bodies(), Acceleration<Space, S>::Zero()),
       A_(b_),
+      last_(b_),
       c0_(mechanism.joints().size(), Components<Space, S>::Zero()),
       known_(mechanism.joints().size(), Acceleration<Space, S>::Zero()),
       known_x_(VectorX<S>::Zero(mechanism.num_u())) {}
@@ -40,15 +41,31 @@ void BodyEquations<Space, S>::SetFree(const Kinematics<Space, S>& kinematics, bo
 }
 
 template <class Space, class S>
-void BodyEquations<Space, S>::SetForce(const Kinematics<Space, S>& kinematics,
-                                       const VectorX<S>& force, const VectorX<S>& target) {
-  known_x_.setZero();
-  has_speeds_ = false;
+void BodyEquations<Space, S>::SetTarget(const VectorX<S>& target) {
+  has_force_ = has_speeds_ = false;
   for (Components<Space, S>& c0 : c0_) c0.setZero();
   for (int index : mechanism_.constraints()) {
     const Joint<Space, S>& joint = mechanism_.joints()[index];
-    c0_[index].head(joint.num_constraints()) = -target.segment(joint.row, joint.num_constraints());
+    for (int k = 0; k < joint.num_constraints(); ++k) c0_[index][k] = -target[joint.row + k];
   }
+}
+
+template <class Space, class S>
+void BodyEquations<Space, S>::SetMore(const VectorX<S>& target) {
+  std::swap(A_, last_);
+  SetTarget(target);
+}
+
+template <class Space, class S>
+void BodyEquations<Space, S>::AddLast() {
+  for (std::size_t body = 0; body < A_.size(); ++body) A_[body] += last_[body];
+}
+
+template <class Space, class S>
+void BodyEquations<Space, S>::SetForce(const Kinematics<Space, S>& kinematics,
+                                       const VectorX<S>& force, const VectorX<S>& target) {
+  known_x_.setZero();
+  SetTarget(target);
   has_force_ = force.size() > 0;
   if (!has_force_) return;
   for (Wrench<Space, S>& wrench : wrenches_) wrench.setZero();

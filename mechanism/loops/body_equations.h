@@ -32,6 +32,10 @@ class BodyEquations {
   void SetWrenches(const Kinematics<Space, S>& kinematics, const VectorX<S>& wrenches);
   /// For ConstraintSolver::Accelerate(): b from the wrenches of applied forces less w x I w.
   void SetState(const Kinematics<Space, S>& kinematics, const VectorX<S>& feedback);
+  /// Sets accelerations of constraints as the only load, for a solution to be added to the last
+  /// one: then AddLast().
+  void SetMore(const VectorX<S>& target);
+  void AddLast();
   /// Sets the velocity violation of `kinematics` as the only load.
   void SetMissed(const Kinematics<Space, S>& kinematics);
 
@@ -57,12 +61,14 @@ class BodyEquations {
   void Read(std::span<const Components<Space, S>> phi, VectorX<S>& lambda) const;
 
  private:
+  /// c0 for accelerations of constraints, without force.
+  void SetTarget(const VectorX<S>& target);
   /// b_ for wrenches_, at the speeds of `kinematics` or at rest.
   void SetFree(const Kinematics<Space, S>& kinematics, bool turning);
 
   const Mechanism<Space, S>& mechanism_;
   std::vector<Wrench<Space, S>> wrenches_;
-  std::vector<Acceleration<Space, S>> b_, A_;
+  std::vector<Acceleration<Space, S>> b_, A_, last_;
   std::vector<Components<Space, S>> c0_;
   std::vector<Acceleration<Space, S>> known_;
   bool has_force_ = false, has_speeds_ = false;

@@ -36,8 +36,10 @@
 // are lengths in a constant scale.
 #pragma once
 
+#include <type_traits>
 #include <vector>
 
+#include "mechanism/algebra/lanes.h"
 #include "mechanism/loops/tree_dynamics.h"
 
 namespace loopbench {
@@ -47,6 +49,7 @@ class SelfStress {
  public:
   /// `mechanism` releases directions, and must outlive this.
   explicit SelfStress(const Mechanism<Space, S>& mechanism);
+  ~SelfStress();  ///< in the library, whose instruction set aligns packs
 
   /// J, T and W at the positions of `kinematics`, and its imposed directions turned as above,
   /// unless the released ones are constraints within the accuracy of the input only. No other call
@@ -67,7 +70,7 @@ class SelfStress {
           const int row = loop.rows_released[q];
           if (row < r_) continue;
           const S share =
-              W_(loop.imposed + k, row - r_) * row_scale_[row] * inverse_scale_[loop.imposed + k];
+              W(loop.imposed + k, row - r_) * row_scale_[row] * inverse_scale_[loop.imposed + k];
           basis[loop.num_u + k] -= basis[loop.num_u + loop.num_imposed + q] * Any(share);
         }
       }
@@ -87,19 +90,29 @@ class SelfStress {
 
  private:
   using Parts = std::array<DirectionParts, Space::kDim>;
+  /// Numbers of several columns of W or of several rows, for operations on all at once.
+  using Pack = std::conditional_t<std::is_same_v<S, double>, Lanes, S>;
+  static constexpr int kPack = std::is_same_v<S, double> ? kLanes : 1;
+  static int PacksFor(int count) { return (count + kPack - 1) / kPack; }
+  static const S& At(const Pack& pack, int i) {
+    return reinterpret_cast<const S*>(&pack)[i];  // vectors may alias their elements
+  }
+  static void Set(Pack& pack, int i, const S& value) { reinterpret_cast<S*>(&pack)[i] = value; }
+
   /// A joint of the spanning forest, at its child: parent and child are bodies.
   struct Edge {
     int joint = -1, parent = kGround, sign = 1, depth = 0;
     int column = 0, D_column = -1;  ///< first columns of J_H and J_D; -1 in joint coordinates
     int num_u = 0, num_columns = 0;
     Parts parts;
-    Basis<Space, S> own_rates;  ///< OwnRates() of its directions
+    bool moves = false;              ///< whether some of its columns do
+    Linear<Space, S> arm, arm_rate;  ///< from the origin of wrenches to Mo
+    Basis<Space, S> own_rates;       ///< OwnRates() of its directions
   };
   /// A joint of the forest on the loop between the two sides of a closing joint.
   struct Link {
     int child = 0;
     bool is_reversed = false;
-    Linear<Space, S> arm, arm_rate;  ///< from it to the point of the loop's joint
   };
   /// A joint that closes a loop. Order of rows: imposed rows of loops, couplings, moving rows,
   /// released rows.
@@ -109,6 +122,8 @@ class SelfStress {
     int num_u = 0, num_imposed = 0, num_released = 0, num_drives = 0;
     std::vector<Link> links;
     Parts parts;
+    bool moves = false;
+    Linear<Space, S> arm, arm_rate;    ///< as of an edge
     Basis<Space, S> basis, own_rates;  ///< as UpdatePosition() has it
 
     int row(int direction) const {
@@ -126,6 +141,13 @@ class SelfStress {
     int coupling = 0;
     std::vector<Coefficient> coefficients;
   };
+  /// A row of J among the equations of the mechanism, and the factor of its numbers there.
+  struct Equation {
+    int row = 0, equation = 0;
+    S scale = S(1);
+  };
+  S W(int row, int column) const { return At(W_[column / kPack * size() + row], column % kPack); }
+  int size() const { return r_ + d_ + D_; }
   int FirstMovingEquation() const {
     return mechanism_->num_rows() + mechanism_->num_coordinate_couplings();
   }
@@ -141,47 +163,65 @@ class SelfStress {
   int ColumnOf(const Edge& edge, int i) const {
     return i < edge.num_u ? edge.column + i : H_ + edge.D_column + i - edge.num_u;
   }
+  /// Arms of all joints on loops.
+  void FillArms(const Kinematics<Space, S>& kinematics);
   void FillRows(const Kinematics<Space, S>& kinematics, Loop& loop);
+  void SetRow(int column, int row, const S& value);
   void FillRates(const Kinematics<Space, S>& kinematics);
   /// gram_ and T in W_; the least pivot over the trace.
   S FactorRows();
+  /// Returns true if no element of T exceeds `most`.
+  bool HasSmallT(const S& most) const;
   /// Rates of directions that are fixed in P, times numbers with the sum V.
   template <class Kind>
   SpatialVector<Space, S, Kind> TurnWithP(const Kinematics<Space, S>& kinematics, int joint,
                                           const SpatialVector<Space, S, Kind>& V) const;
-  /// z = -J_D^T z in the rows of the forest, from its rows of loops; of `count` vectors.
-  void SetForest(const Kinematics<Space, S>& kinematics, S* z, int count);
+  /// Sets the wrench of a loop's joint that its rows of z make, at Mo.
+  template <class T>
+  void SetWrench(const Loop& loop, const T* z, Wrench<Space, T>& F) const;
+  /// z = -J_D^T z in the rows of the forest, from its rows of loops; T: of one vector or of a pack.
+  template <class T>
+  void SetForest(const Kinematics<Space, S>& kinematics, T* z,
+                 std::vector<Wrench<Space, T>>& loads) const;
   /// y = J'^T z.
   void ColumnsOfRates(const Kinematics<Space, S>& kinematics);
   /// z = e'.
   void MeasureSpeeds(const Kinematics<Space, S>& kinematics);
-  /// z = W a with a = (W^T W)^-1 W^T z.
-  void ProjectOnStress();
+  /// z = W a with a = (W^T W)^-1 W^T z, from the first `count` numbers of z; the others are zero.
+  void ProjectOnStress(int count);
   /// Returns U_b^T W W^T rho, in the rows of the mechanism, for the violation of released rows,
   /// which they have in z.
   const VectorX<S>& Share();
-  /// U_b^T z by the mechanism's rows, out of scale.
-  void ToRows(VectorX<S>& rows) const;
+  /// U_b^T z by the mechanism's rows, out of scale. Changes z.
+  void ToRows(VectorX<S>& rows);
 
   const Mechanism<Space, S>* mechanism_;
   std::vector<Edge> edges_;  ///< by child body
   std::vector<int> forest_;  ///< children of the forest's joints
+  std::vector<int> inward_;  ///< those on loops, children before parents
   std::vector<Loop> loops_;
   std::vector<CoupledRow> coupled_;
+  std::vector<Equation> equations_;  ///< of all rows but released ones
   bool is_exact_ = false, is_arranged_ = false;
   std::vector<Released> arranged_;
   int r_ = 0, d_ = 0;  ///< imposed rows (with couplings and moving rows), released rows
   int H_ = 0, D_ = 0;  ///< columns of J_H and J_D
   MatrixX<S> rows_;    ///< J_H transposed; rows and columns in scale
+  /// Imposed rows of J_H, and released ones: number h of several rows, pack after pack.
+  std::vector<Pack> imposed_, released_;
   /// Factors of rows and their inverses, and of columns: 1 / length.
   VectorX<S> row_scale_, inverse_scale_, column_scale_;
   MatrixX<S> gram_, C_;  ///< Cholesky factors, C = W^T W
   /// Numbers by rows of J: r_ imposed rows, d_ released rows, rows of the forest. W has -T, 1 and
-  /// -J_D^T W_c there.
-  MatrixX<S> W_;
+  /// -J_D^T W_c there, for several columns in a pack.
+  std::vector<Pack> W_;
   VectorX<S> z_;
-  VectorX<S> y_;  ///< numbers by columns of J
-  VectorX<S> along_, feedback_, share_;
+  VectorX<S> y_;             ///< numbers by columns of J
+  std::vector<Pack> along_;  ///< numbers by columns of W
+  VectorX<S> feedback_, share_;
+  /// Wrenches by body that its joint of the forest transmits, at the origin: Mo of the first loop.
+  std::vector<Wrench<Space, Pack>> loads_of_pack_;
+  std::vector<Wrench<Space, S>> loads_, load_rates_;
 };
 
 }  // namespace loopbench

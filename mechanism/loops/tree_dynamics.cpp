@@ -3,6 +3,8 @@
 // wrench back: [m; f] at c + r is [m + r x f; f] at c. Equation numbers refer to the O-DCA paper.
 #include "mechanism/loops/tree_dynamics.h"
 
+#include <type_traits>
+
 #include "mechanism/algebra/instantiate.h"
 #include "mechanism/loops/loop_speeds.h"
 
@@ -31,6 +33,27 @@ struct Arms {
 /// X^T I X for a shift of the reference point by r: inertia seen from c instead of c + r.
 template <class Space, class S>
 Block<Space, S> ShiftInertia(const Block<Space, S>& I, const Linear<Space, S>& r) {
+  if constexpr (std::is_same_v<S, double> && Space::kRot == 3) {
+    // X is the identity with e_i x r below its column i; its zeros are left out, with the same
+    // bits.
+    Block<Space, S> IX = I;
+    for (int i = 0; i < 3; ++i) {
+      const Linear<Space, S> x = Linear<Space, S>::Unit(i).cross(r);
+      const int low = i == 0 ? 1 : 0, high = i == 2 ? 1 : 2;
+      for (int k = 0; k < 6; ++k) {
+        IX(k, i) = IX(k, i) + I(k, 3 + low) * x[low] + I(k, 3 + high) * x[high];
+      }
+    }
+    Block<Space, S> shifted = IX;
+    for (int i = 0; i < 3; ++i) {
+      const Linear<Space, S> x = Linear<Space, S>::Unit(i).cross(r);
+      const int low = i == 0 ? 1 : 0, high = i == 2 ? 1 : 2;
+      for (int k = 0; k < 6; ++k) {
+        shifted(i, k) = IX(i, k) + x[low] * IX(3 + low, k) + x[high] * IX(3 + high, k);
+      }
+    }
+    return shifted;
+  }
   Block<Space, S> X;
   for (int i = 0; i < Space::kDim; ++i) {
     const Velocity<Space, S> column = ShiftMotion<Space, S>(Velocity<Space, S>::Unit(i), r);

@@ -92,13 +92,21 @@ struct SpatialJoints {
   template <int... kAxes>
   static void TiltAxes(const Angular<Spatial, S>& z_M, S length, Basis<Spatial, S>& basis_F) {
     const Tilt tilt(z_M);
-    const int axes[] = {kAxes...};
-    for (int i = 0; i < Spatial::kDim; ++i) {
-      basis_F[i] = axes[i] == 0   ? Turn(tilt.about_x)
-                   : axes[i] == 1 ? Turn(tilt.about_y)
-                   : axes[i] == 2 ? Turn(tilt.z_M)
-                                  : Direction<Spatial, S>::Zero();
-      if (axes[i] > 2) basis_F[i][axes[i]] = length;
+    int i = 0;
+    (SetTiltAxis<kAxes>(tilt, length, basis_F[i++]), ...);
+  }
+  template <int axis>
+  LOOPBENCH_INLINE static void SetTiltAxis(const Tilt& tilt, const S& length,
+                                           Direction<Spatial, S>& direction) {
+    direction.setZero();
+    if constexpr (axis == 0) {
+      direction.angular = tilt.about_x;
+    } else if constexpr (axis == 1) {
+      direction.angular = tilt.about_y;
+    } else if constexpr (axis == 2) {
+      direction.angular = tilt.z_M;
+    } else {
+      direction.linear[axis - 3] = length;
     }
   }
   template <int... kAxes>

@@ -294,8 +294,14 @@ template <class Space, class S>
 void SetBasisAt(const JointKind<Space, S>& kind, const Rotation<Space, S>& R,
                 const Pose<Space, S>& X_FM, Basis<Space, S>& basis) {
   kind.basis(X_FM, basis, kind.parameter);
+  // kinds with basis_rate have exact tilts; their shifts are the axes themselves
+  const bool shifts_along_axes = kind.basis_rate != nullptr && !kind.has_screws;
   for (int i = 0; i < Space::kDim; ++i) {
     const bool turns = kind.axes[i] < Space::kRot;
+    if (!turns && shifts_along_axes) {
+      basis[i].linear = R.col(kind.axes[i] - Space::kRot);
+      continue;
+    }
     if constexpr (Space::kRot == 3) {
       if (turns || kind.has_screws) basis[i].angular = R * basis[i].angular;
     }
@@ -376,19 +382,25 @@ template <class Space, class S>
 template <class Columns>
 void Kinematics<Space, S>::OrderDirections(int index, Columns& columns) const {
   const Joint<Space, S>& joint = mechanism_->joints()[index];
-  if (joint.num_drives == 0 && joint.num_released == 0) return;
-  const Columns all = columns;
-  int free = 0, driven = joint.num_u();
-  for (int i = 0; i < joint.kind->num_u; ++i) {
-    columns[mechanism_->DriveOf(joint, i) >= 0 ? driven++ : free++] = all[i];
+  if (joint.num_drives > 0) {
+    const Columns all = columns;
+    int free = 0, driven = joint.num_u();
+    for (int i = 0; i < joint.kind->num_u; ++i) {
+      columns[mechanism_->DriveOf(joint, i) >= 0 ? driven++ : free++] = all[i];
+    }
   }
   if (joint.num_released == 0) return;
   const std::vector<int>& out = std::ranges::find(released_, index, &Released::joint)->directions;
-  int kept = joint.kind->num_u, last = Space::kDim - joint.num_released;
-  for (int i = 0; i < joint.kind->num_constraints(); ++i) {
-    const bool is_out = std::ranges::binary_search(out, i);
-    columns[is_out ? last++ : kept++] = all[joint.kind->num_u + i];
+  Columns released;
+  const int first = joint.kind->num_u, count = joint.num_released;
+  for (int next = 0, i = 0, kept = first; i < joint.kind->num_constraints(); ++i) {
+    if (next < count && out[next] == i) {
+      released[next++] = columns[first + i];
+    } else if (kept++ != first + i) {
+      columns[kept - 1] = columns[first + i];
+    }
   }
+  for (int i = 0; i < count; ++i) columns[Space::kDim - count + i] = released[i];
 }
 
 /// [H D] in ground axes.

@@ -9,6 +9,7 @@
 #include "mechanism/loops/joint_response.h"
 #include "mechanism/loops/loop_speeds.h"
 #include "mechanism/loops/scaled_loops.h"
+#include "mechanism/loops/tree_dynamics.h"
 
 namespace loopbench {
 
@@ -57,6 +58,61 @@ std::vector<RedundantDirection> FindDependent(const MechanismDescription& descri
   return dependent;
 }
 
+/// Couplings whose rows depend on all others here, each without the ones found before it; the last
+/// of a file first.
+template <class Space>
+std::vector<RedundantDirection> FindDependentCouplings(const Kinematics<Space, double>& kinematics,
+                                                       const MechanismDescription& description) {
+  std::vector<RedundantDirection> dependent;
+  const Mechanism<Space, double>& mechanism = kinematics.mechanism();
+  const Eigen::MatrixXd rows = ScaleLoops(kinematics).rows;
+  if (rows.size() == 0) return dependent;
+  Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr;
+  qr.setThreshold(kRankRatio);
+  qr.compute(rows);
+  const Eigen::Index m = rows.rows();
+  // columns: sums of rows that vanish
+  Eigen::MatrixXd relations =
+      Eigen::MatrixXd(qr.householderQ() * Eigen::MatrixXd::Identity(m, m)).rightCols(m - qr.rank());
+  for (int c = mechanism.num_coordinate_couplings() - 1; c >= 0 && relations.cols() > 0; --c) {
+    const Eigen::MatrixXd share = relations.row(mechanism.num_rows() + c).transpose();
+    if (!(share.norm() > kRankRatio)) continue;
+    // the other relations leave this row out
+    const Eigen::HouseholderQR<Eigen::MatrixXd> turn(share);
+    relations.applyOnTheRight(turn.householderQ());
+    relations = relations.rightCols(relations.cols() - 1).eval();
+    dependent.push_back({kinematics.FirstOf(c).joint,
+                         "coupling \"" + description.couplings[c].name + "\"", false, c});
+  }
+  return dependent;
+}
+
+/// Largest component of the accelerations of constraints that no acceleration of the joints meets
+/// at speeds u. Less than a hundredth of u^2, times lengths below 1 m, counts as 0: near a singular
+/// position, coordinates of six digits change speeds by a thousandth.
+template <class Space>
+double UnmetAcceleration(Kinematics<Space, double>& kinematics, const VectorX<double>& u) {
+  const Mechanism<Space, double>& mechanism = kinematics.mechanism();
+  TreeDynamics<Space, double> dynamics(mechanism);
+  kinematics.UpdateVelocity(u);
+  VectorX<double> bias, gamma = VectorX<double>::Zero(mechanism.num_equations());
+  MatrixX<double> J, G;
+  dynamics.Bias(kinematics, bias);
+  dynamics.JacobianBias(kinematics, gamma);
+  dynamics.Jacobian(kinematics, J);
+  dynamics.CouplingJacobian(kinematics, G);
+  Eigen::MatrixXd rows(gamma.size(), mechanism.num_u());
+  rows << J, G;
+  Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> solver;
+  solver.setThreshold(kRankRatio);
+  solver.compute(rows);
+  const VectorX<double> left = gamma - rows * solver.solve(gamma);
+  constexpr double kOfRoundedStart = 1e-2;
+  const double unmet = left.template lpNorm<Eigen::Infinity>();
+  return unmet > kOfRoundedStart * u.squaredNorm() * std::min(1.0, mechanism.length()) ? unmet
+                                                                                       : 0.0;
+}
+
 template <class Space>
 class Analysis {
  public:
@@ -94,6 +150,17 @@ class Analysis {
     if (known && redundancy.rounding > 0.0) result_.rank = redundancy.rank_at_start;
     result_.rank_nearby = known ? redundancy.rank : result_.rank;
     FindFreedomOfParts();
+    if (!driven && !known && result_.couplings > 0) {
+      const MechanismDescription rest = Release(description_, redundancy);
+      const Mechanism<Space, double> mechanism(rest, Coordinates::kJoint);
+      Kinematics<Space, double> at_start(mechanism);
+      at_start.UpdatePosition(result_.start.q);
+      std::ranges::copy(FindDependentCouplings(at_start, description_),
+                        std::back_inserter(result_.redundant));
+    }
+    if (!driven && result_.singular_start() && result_.start.outcome == Outcome::kFinished) {
+      result_.unmet_acceleration = UnmetAcceleration(kinematics, result_.start.u);
+    }
     if (!driven) return result_;
     const MechanismDescription released = Release(description_, redundancy);
     const Mechanism<Space, double> rest(released, Coordinates::kJoint);

@@ -28,6 +28,7 @@ struct RedundantDirection {
   int joint = 0;
   std::string name;       ///< in words
   bool released = false;  ///< at every position, so that runs do not impose it (redundancy.h)
+  int coupling = -1;      ///< that it belongs to instead; -1: none
 };
 
 struct Structure {
@@ -54,9 +55,12 @@ struct Structure {
   /// Singular values of the scaled loops at the start, falling; empty above kMaxAnalysedSpeeds,
   /// where `analysed` means that all constraints are independent.
   Eigen::VectorXd singular_values;
-  /// Constraints that can be dropped together; loop_rows - rank_nearby.
+  /// Constraints that can be dropped together, loop_rows - rank_nearby, and redundant couplings.
   std::vector<RedundantDirection> redundant;
   double rounding = 0.0;  ///< of Redundancy [lengths]
+  /// Accelerations of constraints that no acceleration of the joints meets, at the speeds of a
+  /// singular start [m/s^2 or rad/s^2]. 0: the speeds belong to a motion, to second order.
+  double unmet_acceleration = 0.0;
 
   /// Mobility of parts analysed separately, if one of them cannot move and others can.
   std::optional<int> freedom_of_parts;

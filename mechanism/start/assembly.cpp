@@ -184,6 +184,39 @@ Start<double> Assemble(const MechanismDescription& description,
 template Start<double> Assemble(const MechanismDescription&, const Mechanism<Planar, double>&);
 template Start<double> Assemble(const MechanismDescription&, const Mechanism<Spatial, double>&);
 
+template <class Space>
+VectorX<double> GuessedPositions(const MechanismDescription& description,
+                                 const Mechanism<Space, double>& mechanism) {
+  VectorX<double> q = VectorX<double>::Zero(mechanism.num_q());
+  for (const TreeStep& step : mechanism.tree()) {
+    const Joint<Space, double>& joint = mechanism.joints()[step.joint];
+    if (joint.kind->has_quaternion()) q[joint.q_offset] = 1.0;  // the unit quaternion
+  }
+  for (const JointValues& values : description.initial.coordinates) {
+    const Joint<Space, double>& joint = mechanism.joints()[values.joint];
+    if (!joint.in_tree()) continue;
+    mechanism.ForEachFree(joint, joint.kind->num_q,
+                          [&](int i, int free) { q[joint.q_offset + free] = values.values[i]; });
+  }
+  return q;
+}
+
+template VectorX<double> GuessedPositions(const MechanismDescription&,
+                                          const Mechanism<Planar, double>&);
+template VectorX<double> GuessedPositions(const MechanismDescription&,
+                                          const Mechanism<Spatial, double>&);
+
+std::vector<MissedGuess> FindMissedGuesses(const MechanismDescription& description,
+                                           const VectorX<double>& q) {
+  return ForSpace(description.space, [&]<class Space>(Space) {
+    const Mechanism<Space, double> mechanism(Unreleased(description), Coordinates::kJoint);
+    Kinematics<Space, double> kinematics(mechanism);
+    kinematics.UpdatePosition(q);
+    const AssemblyUnits<Space> units(kinematics);
+    return Guesses<Space>(description, mechanism, units).Missed(kinematics);
+  });
+}
+
 MechanismDescription Perturb(MechanismDescription description, double amplitude, std::uint64_t seed,
                              int member) {
   std::seed_seq sequence{seed, static_cast<std::uint64_t>(member)};

@@ -1,8 +1,6 @@
 // Accelerations and joint forces of O-DCA against the oracle, family by family: within
 // 100 eps n / rcond for every sample, within 1e-12 where rcond is above 1e-2, in both coordinate
 // sets. The worst of each family is printed.
-#include <gtest/gtest.h>
-
 #include "harness/config/mechanism_reader.h"
 #include "tests/contract/comparison.h"
 

@@ -1,14 +1,9 @@
 // The contract as a function: kept by every built-in formulation, and broken promises are found.
 #include "tests/contract/check.h"
 
-#include <gtest/gtest.h>
-
-#include <Eigen/LU>
-#include <algorithm>
-#include <stdexcept>
-
 #include "harness/config/formulations.h"
 #include "mechanism/loops/tree_dynamics.h"
+#include "tests/standard.h"
 
 namespace loopbench::contract {
 namespace {

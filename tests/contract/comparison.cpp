@@ -1,11 +1,5 @@
 #include "tests/contract/comparison.h"
 
-#include <gtest/gtest.h>
-
-#include <cmath>
-#include <cstdio>
-#include <limits>
-
 #include "odca/odca.h"
 #include "tests/contract/system_with.h"
 

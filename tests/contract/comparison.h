@@ -1,10 +1,9 @@
 // O-DCA held against the oracle: errors of one sample, and the worst of a family.
 #pragma once
 
-#include <string>
-
 #include "mechanism/formulation/options.h"
 #include "tests/contract/sample.h"
+#include "tests/standard.h"
 
 namespace loopbench::testing {
 

@@ -2,20 +2,10 @@
 // solver, coordinate set and space, on mechanisms that all of them can run.
 #pragma once
 
-#include <gtest/gtest.h>
-
-#include <limits>
-#include <memory>
-#include <optional>
-#include <string>
-#include <vector>
-
 #include "harness/config/formulations.h"
 #include "tests/contract/comparison.h"
 
 namespace loopbench::testing {
-
-constexpr double kEps = std::numeric_limits<double>::epsilon();
 
 struct Case {
   std::string formulation;

@@ -1,7 +1,4 @@
 // Baumgarte's stabilisation: mismatches of positions and speeds come back as accelerations.
-#include <cmath>
-#include <utility>
-
 #include "tests/contract/contract.h"
 
 namespace loopbench::testing {

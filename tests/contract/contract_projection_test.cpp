@@ -1,6 +1,4 @@
 // Level `projection`: requirements beyond the common contract.
-#include <cmath>
-
 #include "tests/contract/contract.h"
 
 namespace loopbench::testing {

@@ -2,8 +2,6 @@
 // level of enforcement, solver, coordinate set and space.
 #include "tests/contract/contract.h"
 
-#include <cmath>
-
 #include "lagrange/lagrange.h"
 #include "odca/odca.h"
 #include "reduction/reduction.h"

@@ -1,10 +1,5 @@
 // Couplings of joint coordinates and rotors: every formulation, level, solver, coordinate set and
 // space against an independent dense KKT system of the bodies' planar coordinates, and bad input.
-#include <gtest/gtest.h>
-
-#include <Eigen/LU>
-#include <cmath>
-
 #include "mechanism/description/library.h"
 #include "mechanism/description/transforms.h"
 #include "mechanism/formulation/forward_jacobian.h"
@@ -55,10 +50,7 @@ MechanismDescription Gripper() {
   d.joints[4].cut = true;
   d.couplings.push_back({"mirror", {{0, 1.0}, {4, 1.0}}, 0.0});
   d.couplings.push_back({"pinion", {{8, 1.0}, {0, -0.04}}, 0.01});
-  JointTorque torque;
-  torque.joint = 2;
-  torque.value = Polynomial{{0.8}};
-  d.forces.push_back(torque);
+  d.forces.push_back(JointTorque{.joint = 2, .value = Polynomial{{0.8}}});
   d.initial.coordinates.push_back({0, {0.4}});
   d.initial.held.push_back(0);
   d.initial.coordinates.push_back({2, {0.4}});
@@ -339,10 +331,7 @@ MechanismDescription GearTrain(const std::vector<double>& teeth, double torque) 
     d.couplings.push_back(
         {"mesh " + std::to_string(i + 1), {{i, teeth[i]}, {i + 1, teeth[i + 1]}}, 0.0});
   }
-  JointTorque drive;
-  drive.joint = 0;
-  drive.value = Polynomial{{torque}};
-  d.forces.push_back(drive);
+  d.forces.push_back(JointTorque{.joint = 0, .value = Polynomial{{torque}}});
   return d;
 }
 
@@ -383,10 +372,7 @@ TEST(Couplings, ADifferentialSplitsTheTorque) {
   }
   d.couplings.push_back({"bevel", {{0, 1.0}, {1, 1.0}, {2, -2.0}}, 0.0});
   for (const auto& [joint, value] : {std::pair{2, tau}, {0, t_left}}) {
-    JointTorque torque;
-    torque.joint = joint;
-    torque.value = Polynomial{{value}};
-    d.forces.push_back(torque);
+    d.forces.push_back(JointTorque{.joint = joint, .value = Polynomial{{value}}});
   }
   Eigen::Matrix2d M;
   M << I + C / 4, C / 4, C / 4, I + C / 4;

@@ -2,20 +2,9 @@
 // for every shipped mechanism and for random ones, in all formulations, levels and coordinate sets.
 #include "mechanism/formulation/forward_jacobian.h"
 
-#include <gtest/gtest.h>
-
 #include <Eigen/Eigenvalues>
-#include <algorithm>
-#include <cmath>
-#include <filesystem>
-#include <limits>
-#include <memory>
-#include <span>
-#include <string>
-#include <vector>
 
 #include "harness/integrator/arkode.h"
-#include "harness/run/run.h"
 #include "mechanism/start/assembly.h"
 #include "odca/odca.h"
 #include "tests/contract/allocations.h"
@@ -30,7 +19,6 @@ using Eigen::VectorXd;
 using harness::Method;
 
 constexpr int kMaxColumns = 12;
-constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
 
 /// One column of a Jacobian by differences, and what each entry may be wrong by.
 struct Quotient {
@@ -146,7 +134,7 @@ void CompareAt(const MechanismDescription& description, System<Space, double>& f
   const bool is_odca =
       dynamic_cast<const odca::Odca<Space, double>*>(&formulation.solver()) != nullptr;
   const double cancels = is_odca && !redundant ? Slenderness(formulation.mechanism()) : 1.0;
-  const double relative = 100 * kEpsilon * formulation.mechanism().num_bodies() / (rcond * cancels);
+  const double relative = 100 * kEps * formulation.mechanism().num_bodies() / (rcond * cancels);
   const double noise = relative * f0.cwiseAbs().maxCoeff();
   // of large states some columns, other ones for every method
   const int stride = 1 + n / kMaxColumns;
@@ -239,17 +227,7 @@ TEST_P(ForwardJacobianOf, ShippedMechanismIsThatOfDifferences) {
   }
 }
 
-std::vector<std::string> ShippedNames() {
-  std::vector<std::string> names;
-  const auto folder = harness::kConfigs / "mechanisms";
-  for (const auto& entry : std::filesystem::directory_iterator(folder)) {
-    if (entry.path().extension() == ".json") names.push_back(entry.path().stem().string());
-  }
-  std::ranges::sort(names);
-  return names;
-}
-
-INSTANTIATE_TEST_SUITE_P(All, ForwardJacobianOf, ::testing::ValuesIn(ShippedNames()),
+INSTANTIATE_TEST_SUITE_P(All, ForwardJacobianOf, ::testing::ValuesIn(harness::ShippedNames()),
                          [](const auto& name) {
                            std::string text = name.param;
                            std::erase(text, '-');

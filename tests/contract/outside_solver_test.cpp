@@ -1,7 +1,5 @@
 // A solver that the project does not know: two functions, and every level, coordinate set, Jacobian
 // and power comes with them.
-#include <Eigen/LU>
-
 #include "mechanism/formulation/forward_jacobian.h"
 #include "tests/contract/contract.h"
 

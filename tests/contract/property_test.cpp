@@ -7,15 +7,7 @@
 // value between 1e-12 and 1e-4 is neither lost nor kept for certain: such a sample is ambiguous,
 // and only a named outcome is required. In all others the rank is the number of values above the
 // gap, by an SVD in long double. Formulations must find this rank and the oracle's accelerations.
-#include <gtest/gtest.h>
-
 #include <Eigen/SVD>
-#include <algorithm>
-#include <cmath>
-#include <cstdio>
-#include <limits>
-#include <map>
-#include <memory>
 
 #include "lagrange/lagrange.h"
 #include "mechanism/formulation/system.h"
@@ -23,8 +15,7 @@
 #include "reduction/reduction.h"
 #include "tests/contract/comparison.h"
 
-namespace loopbench::testing {
-namespace property_test {
+namespace loopbench::testing::property_test {
 
 constexpr int kSamples = 300;  // in each space
 constexpr Real kLost = 1e-12L, kKept = 1e-4L;
@@ -168,7 +159,7 @@ void CheckWork(const System<Space, double>& at, const std::vector<int>& joints, 
   }
   const double error = std::abs(power - expected) / scale;
   // speeds are consistent but for rounding, whatever the forces: no condition number
-  EXPECT_LE(error, 100 * std::numeric_limits<double>::epsilon() * at.mechanism().num_bodies());
+  EXPECT_LE(error, 100 * kEps * at.mechanism().num_bodies());
   tally.Note("work of constraints", error);
 }
 
@@ -322,5 +313,4 @@ TEST(PropertyTest, MechanismsOfAllKindsInSpace) {
   ExamineAll<Spatial>("all kinds", DrawnKinds::kAll);
 }
 
-}  // namespace property_test
-}  // namespace loopbench::testing
+}  // namespace loopbench::testing::property_test

@@ -2,17 +2,9 @@
 // not depend on the released rows.
 #include "mechanism/loops/self_stress.h"
 
-#include <gtest/gtest.h>
-
-#include <limits>
-#include <numbers>
-#include <set>
-
 #include "lagrange/lagrange.h"
-#include "mechanism/description/library.h"
 #include "mechanism/formulation/system.h"
 #include "mechanism/simplify/redundancy.h"
-#include "mechanism/start/assembly.h"
 #include "odca/odca.h"
 #include "reduction/reduction.h"
 #include "tests/mechanism/shipped.h"
@@ -161,7 +153,7 @@ TEST_P(ReleasedRows, ChangeAccelerationsToSecondOrderInTheMismatchAlone) {
   // O-DCA and multipliers solve the same equations at any mismatch; condition numbers are below 1e5
   const VectorX<double> odca = Evaluate(GetParam(), solvers[0], 1e-3).udot;
   const VectorX<double> lagrange = Evaluate(GetParam(), solvers[1], 1e-3).udot;
-  const double bound = 1e5 * 16 * std::numeric_limits<double>::epsilon();
+  const double bound = 1e5 * 16 * kEps;
   EXPECT_LT((odca - lagrange).lpNorm<Eigen::Infinity>(),
             bound * lagrange.lpNorm<Eigen::Infinity>());
   for (const Solver make : solvers) {
@@ -207,7 +199,7 @@ TEST(MovingRows, HaveTheRightAccelerationsInAllPositions) {
     std::set<std::vector<int>> choices;
     std::vector<double> y(static_cast<std::size_t>(system->size())), ydot = y;
     for (int k = 0; k <= 240; ++k) {
-      const double angle = std::numbers::pi / 60.0 * (k <= 120 ? k : 240 - k);
+      const double angle = kPi / 60.0 * (k <= 120 ? k : 240 - k);
       VectorX<double> q(4), u(4);
       q << angle, angle, angle, -angle;
       u << 1.3, 1.3, 1.3, -1.3;

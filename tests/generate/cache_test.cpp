@@ -1,18 +1,13 @@
 // The compiler and the folder of compiled code: what is found there is refused unless it is safe.
-#include <gtest/gtest.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include <csignal>
-#include <cstdlib>
-#include <filesystem>
-#include <fstream>
-
 #include "harness/base/text.h"
 #include "harness/generate/generated.h"
 #include "harness/generate/record.h"
+#include "tests/standard.h"
 
 namespace loopbench::generate {
 namespace {

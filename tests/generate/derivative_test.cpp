@@ -1,14 +1,5 @@
 // Recorded right-hand sides: their numbers are those of the library's text, whatever the state, and
 // compiled code has the bits of the graph.
-#include <fmt/format.h>
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <cstdlib>
-#include <filesystem>
-#include <iterator>
-#include <random>
-
 #include "harness/base/text.h"
 #include "harness/config/formulations.h"
 #include "harness/config/mechanism_reader.h"
@@ -20,6 +11,7 @@
 #include "mechanism/description/library.h"
 #include "mechanism/formulation/forward_jacobian.h"
 #include "tests/contract/generators.h"
+#include "tests/standard.h"
 
 namespace loopbench::generate {
 namespace {

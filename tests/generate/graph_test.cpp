@@ -2,14 +2,6 @@
 // derivatives: rules one by one, and Jacobians of right-hand sides against differences.
 #include "harness/generate/graph.h"
 
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <cmath>
-#include <filesystem>
-#include <functional>
-#include <random>
-
 #include "harness/generate/recorded.h"
 //
 #include "harness/config/mechanism_reader.h"
@@ -18,6 +10,7 @@
 #include "harness/run/run.h"
 #include "harness/run/timing.h"
 #include "mechanism/algebra/lanes.h"
+#include "tests/standard.h"
 
 namespace loopbench::generate {
 namespace {
@@ -208,8 +201,7 @@ TEST(LanesTest, EachLaneHasTheBitsOfItsGraph) {
           const Operation operation = graph.nodes()[outputs[i]].operation;
           const bool is_sine = operation == Operation::kSin || operation == Operation::kCos;
           // both functions are within 1.1 units in the last place, which is at most eps
-          const double allowed =
-              own_sines && is_sine ? 2.2 * std::numeric_limits<double>::epsilon() : 0.0;
+          const double allowed = own_sines && is_sine ? 2.2 * kEps : 0.0;
           const double value = expected[outputs[i]];  // some are infinite
           EXPECT_TRUE(y[i][lane] == value || std::abs(y[i][lane] - value) <= allowed) << i;
         }
@@ -303,7 +295,7 @@ TEST(DifferentiateTest, EachOperationHasTheDerivativeOfTextbooks) {
     }
     const std::vector<double> values = graph.Values({0.4, 1.3});
     EXPECT_TRUE(graph.Holds(values)) << name;
-    const double eps = std::numeric_limits<double>::epsilon();
+    const double eps = kEps;
     const double expected[] = {by_x(0.4, 1.3), by_y(0.4, 1.3)};
     for (const std::size_t i : {0, 1}) {
       EXPECT_NEAR(values[static_cast<std::size_t>(jacobian[i])], expected[i],

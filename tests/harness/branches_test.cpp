@@ -1,25 +1,10 @@
 // Assembly branches against closed forms and known numbers of solutions.
 #include "mechanism/start/branches.h"
 
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <cmath>
-#include <numbers>
-#include <stdexcept>
-#include <string>
-#include <vector>
-
-#include "harness/config/mechanism_reader.h"
 #include "mechanism/start/assembly.h"
 #include "tests/harness/places.h"
 
-namespace loopbench::harness {
-namespace branches_test {
-
-MechanismDescription Shipped(const std::string& name) {
-  return ReadMechanism(kConfigs / "mechanisms" / (name + ".json")).description;
-}
+namespace loopbench::harness::branches_test {
 
 double ValueOf(const Branch& branch, const std::string& joint) {
   for (const JointValues& values : branch.description.initial.coordinates) {
@@ -32,7 +17,7 @@ double Modulo(double angle) { return std::remainder(angle, 2.0 * std::numbers::p
 
 /// The coupler's tip lies on two circles, which intersect twice.
 TEST(Branches, AFourBarHasBothIntersectionsOfItsCircles) {
-  const MechanismDescription four_bar = Shipped("four-bar");
+  const MechanismDescription four_bar = Shipped("four-bar").description;
   const Branches branches = FindBranches(four_bar, 50);
   EXPECT_EQ(branches.freedom, 0);
   ASSERT_EQ(branches.found.size(), 2u);
@@ -70,7 +55,7 @@ TEST(Branches, KnownNumbersOfSolutions) {
                          {"slider-crank", 2},
                          {"square-four-bar", 2},
                          {"four-bar-in-space", 2}}) {
-    const Branches branches = FindBranches(Shipped(row.name), 100);
+    const Branches branches = FindBranches(Shipped(row.name).description, 100);
     EXPECT_EQ(branches.freedom, 0) << row.name;
     EXPECT_EQ(branches.found.size(), row.count) << row.name;
     int times = 0;
@@ -81,14 +66,14 @@ TEST(Branches, KnownNumbersOfSolutions) {
 
 /// If two of its joints coincide, the rest of the Peaucellier linkage turns about them.
 TEST(Branches, PositionsThatStillMoveAreCounted) {
-  const Branches branches = FindBranches(Shipped("peaucellier"), 60);
+  const Branches branches = FindBranches(Shipped("peaucellier").description, 60);
   EXPECT_GT(branches.movable, 0);
   for (const Branch& branch : branches.found) EXPECT_LT(branch.times, 60);
   EXPECT_LE(branches.found.size(), 8u);
 }
 
 TEST(Branches, EachIsAStartOfItsOwn) {
-  for (const Branch& branch : FindBranches(Shipped("general-seven-bar"), 100).found) {
+  for (const Branch& branch : FindBranches(Shipped("general-seven-bar").description, 100).found) {
     const Mechanism<Planar, double> mechanism(branch.description, Coordinates::kJoint);
     const Start<double> start = Assemble<Planar>(branch.description, mechanism);
     EXPECT_EQ(start.outcome, Outcome::kFinished);
@@ -99,15 +84,14 @@ TEST(Branches, EachIsAStartOfItsOwn) {
 }
 
 TEST(Branches, FreeMotionsAndOpenLoopsAreNamed) {
-  MechanismDescription free = Shipped("four-bar");
+  MechanismDescription free = Shipped("four-bar").description;
   free.initial.held.clear();
   const Branches branches = FindBranches(free, 50);
   EXPECT_EQ(branches.freedom, 1);
   EXPECT_EQ(branches.starts, 0);
-  MechanismDescription open = Shipped("four-bar");
+  MechanismDescription open = Shipped("four-bar").description;
   open.joints.back().to.position.x() += 10.0;
   EXPECT_THROW(FindBranches(open, 50), std::invalid_argument);
 }
 
-}  // namespace branches_test
-}  // namespace loopbench::harness
+}  // namespace loopbench::harness::branches_test

@@ -1,21 +1,9 @@
 // Butcher tables of ARKODE, of files and of programs, and their order conditions.
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <cmath>
-#include <cstdio>
-#include <limits>
-#include <stdexcept>
-#include <string>
-#include <vector>
-
 #include "harness/config/experiment_reader.h"
 #include "harness/config/options.h"
-#include "harness/integrator/arkode.h"
 #include "harness/run/run.h"
 #include "tests/harness/cli_fixture.h"
 #include "tests/harness/integrator_problems.h"
-#include "tests/harness/places.h"
 
 namespace loopbench::harness {
 using namespace integrator_test;
@@ -250,11 +238,11 @@ TEST(ButcherTablesOfFiles, WithoutEmbeddingHaveNoTimingAtATolerance) {
 class IntegratorsProgram : public CommandLineTest {};
 
 TEST_F(IntegratorsProgram, ListsThemAndRunsThoseOfFiles) {
-  ExpectEnding(Call("integrators"), 0,
-               {"ode45", "ARKODE_DORMAND_PRINCE_7_4_5", "ARKODE_KNOTH_WOLKE_3_3", "implicit"});
-  ExpectEnding(Call("integrators --json"), 0,
-               {R"({"integrator":"ARKODE_ZONNEVELD_5_3_4","order":4,"embedded_order":3,"stages":5,)"
-                R"("kind":"explicit")"});
+  Expect("integrators", 0,
+         {"ode45", "ARKODE_DORMAND_PRINCE_7_4_5", "ARKODE_KNOTH_WOLKE_3_3", "implicit"});
+  Expect("integrators --json", 0,
+         {R"({"integrator":"ARKODE_ZONNEVELD_5_3_4","order":4,"embedded_order":3,"stages":5,)"
+          R"("kind":"explicit")"});
   Write("rule.json", R"({"name": "three-eighths", "A": [[0, 0, 0, 0], ["1/3", 0, 0, 0],
     ["-1/3", 1, 0, 0], [1, -1, 1, 0]], "b": ["1/8", "3/8", "3/8", "1/8"],
     "c": [0, "1/3", "2/3", 1], "order": 4})");
@@ -262,23 +250,24 @@ TEST_F(IntegratorsProgram, ListsThemAndRunsThoseOfFiles) {
     "integrator": ["rule.json", "ARKODE_ZONNEVELD_5_3_4"],
     "problems": [{"mechanism": "four-bar.json", "horizon": 0.5}],
     "methods": [{"formulation": "odca", "enforcement": "acceleration"}]})");
-  ExpectEnding(Call("run own.json --out out"), 0, {"ran 2 cases"});
-  ExpectEnding(Call("explain own.json --set /tolerances=1e-6 --set /integrator=verner --set "
-                    "'/atol={\"length\": 1e-9}'"),
-               0, {"relative tolerances: 1e-06", "1e-09 m, 0 rad, 0 m/s, 0 rad/s"});
-  ExpectEnding(Call("table out --columns integrator,steps,rhs_evaluations --format csv"), 0,
-               {"three-eighths,10,", "ARKODE_ZONNEVELD_5_3_4,10,"});
+  Expect("run own.json --out out", 0, {"ran 2 cases"});
+  Expect(
+      "explain own.json --set /tolerances=1e-6 --set /integrator=verner --set "
+      "'/atol={\"length\": 1e-9}'",
+      0, {"relative tolerances: 1e-06", "1e-09 m, 0 rad, 0 m/s, 0 rad/s"});
+  Expect("table out --columns integrator,steps,rhs_evaluations --format csv", 0,
+         {"three-eighths,10,", "ARKODE_ZONNEVELD_5_3_4,10,"});
   Write("rule.json", R"({"name": "three-eighths", "A": [[0]], "b": [1], "c": [0], "order": 2})");
-  ExpectEnding(Call("check own.json"), 2,
-               {"rule.json:1: /order: found coefficients of order 1", "expected order 2"});
+  Expect("check own.json", 2,
+         {"rule.json:1: /order: found coefficients of order 1", "expected order 2"});
 }
 
 /// The orders of the shipped example, as the legend of the figure has them: 3 and 4 within 0.1.
 TEST_F(IntegratorsProgram, DrawObservedOrders) {
   const std::string example = (kConfigs / "experiments/examples/butcher-tables.json").string();
-  ExpectEnding(Call("run " + example + " --out out"), 0, {"ran 19 cases"});
-  ExpectEnding(Call("work-precision out --cost-key rhs_evaluations --figures --out out"), 0,
-               {"wrote 5 figures to out/figures"});
+  Expect("run " + example + " --out out", 0, {"ran 19 cases"});
+  Expect("work-precision out --cost-key rhs_evaluations --figures --out out", 0,
+         {"wrote 5 figures to out/figures"});
   const fs::path figures = folder_ / "out/figures";
   const std::string orders = ReadFile(figures / "order-four-bar-horizon-1-velocity.svg");
   for (const auto& [table, order] :

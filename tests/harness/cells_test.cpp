@@ -1,10 +1,8 @@
 // Room on a terminal, held against what Unicode's East Asian Width and terminals say.
-#include <gtest/gtest.h>
-
 #include "harness/base/text.h"
+#include "tests/standard.h"
 
-namespace loopbench::harness {
-namespace cells_test {
+namespace loopbench::harness::cells_test {
 
 TEST(Cells, WideCharactersTakeTwoAndMarksNone) {
   EXPECT_EQ(CellsOf(""), 0u);
@@ -29,5 +27,4 @@ TEST(Cells, LinesBreakBehindCommasThenAtSpacesThenAnywhere) {
   EXPECT_EQ(BrokenInto("exactly", 7), Lines{"exactly"});
 }
 
-}  // namespace cells_test
-}  // namespace loopbench::harness
+}  // namespace loopbench::harness::cells_test

@@ -1,17 +1,9 @@
 // Where series change their level: the segmentation against a search of all of them, false alarms
 // and power on series whose answer is known.
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <cmath>
-#include <limits>
-#include <random>
-#include <vector>
-
 #include "harness/history/history.h"
+#include "tests/standard.h"
 
-namespace loopbench::harness {
-namespace change_points_test {
+namespace loopbench::harness::change_points_test {
 
 /// The least sum of min((x - mu)^2, K^2) over all mu: at the optimum mu is the mean of the values
 /// closer than K, and these are neighbours in order.
@@ -191,5 +183,4 @@ TEST(ChangePoints, StepsAreFoundInNoise) {
   EXPECT_GE(found, 95);
 }
 
-}  // namespace change_points_test
-}  // namespace loopbench::harness
+}  // namespace loopbench::harness::change_points_test

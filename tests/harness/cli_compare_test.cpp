@@ -1,10 +1,7 @@
 // compare, fit and export as their users call them, and loopbench_bench where it is built.
-#include <tuple>
-
 #include "tests/harness/cli_fixture.h"
 
-namespace loopbench::harness {
-namespace cli_compare_test {
+namespace loopbench::harness::cli_compare_test {
 
 using ComparisonCommands = CommandLineTest;
 
@@ -337,5 +334,4 @@ TEST_F(BenchmarkProgram, RefusesBadInput) {
 
 #endif
 
-}  // namespace cli_compare_test
-}  // namespace loopbench::harness
+}  // namespace loopbench::harness::cli_compare_test

@@ -1,11 +1,8 @@
 // Sweeps, --set, plan and explain through the program.
-#include <set>
-
 #include "harness/config/experiment_reader.h"
 #include "tests/harness/cli_fixture.h"
 
-namespace loopbench::harness {
-namespace cli_experiments_test {
+namespace loopbench::harness::cli_experiments_test {
 
 /// tiny.json with a sweep of two masses, without the lagrange cases of the second.
 std::string Swept() {
@@ -191,5 +188,4 @@ TEST_F(CommandLineTest, LaddersNeedABuildWithTheirScalars) {
 
 #endif
 
-}  // namespace cli_experiments_test
-}  // namespace loopbench::harness
+}  // namespace loopbench::harness::cli_experiments_test

@@ -2,15 +2,7 @@
 // it.
 #pragma once
 
-#include <gtest/gtest.h>
 #include <sys/wait.h>
-
-#include <algorithm>
-#include <cstdio>
-#include <filesystem>
-#include <stdexcept>
-#include <string>
-#include <vector>
 
 #include "harness/base/store.h"
 #include "harness/base/text.h"
@@ -88,7 +80,7 @@ class CommandLineTest : public testing::Test {
   void TearDown() override { fs::remove_all(folder_); }
 
   void Write(const std::string& name, const std::string& text) const {
-    WriteFileAtomically(folder_ / name, text);
+    WriteFileAtomically(folder_ / name, text, Onto::kAnyFile);
   }
 
   /// Writes four-bar.json with its first `from` replaced.

@@ -1,8 +1,7 @@
 // History through the program: a folder or a branch, steps, pages, and as the base of a comparison.
 #include "tests/harness/cli_fixture.h"
 
-namespace loopbench::harness {
-namespace cli_history_test {
+namespace loopbench::harness::cli_history_test {
 
 class CommandLineHistory : public CommandLineTest {
  protected:
@@ -92,5 +91,4 @@ TEST_F(CommandLineHistory, CompareNeedsOneBaseWithACommit) {
          {"found no branch \"nothing-here\"", "history add begins one"});
 }
 
-}  // namespace cli_history_test
-}  // namespace loopbench::harness
+}  // namespace loopbench::harness::cli_history_test

@@ -3,8 +3,7 @@
 
 #include "tests/harness/cli_fixture.h"
 
-namespace loopbench::harness {
-namespace cli_names_test {
+namespace loopbench::harness::cli_names_test {
 
 constexpr const char* kRun = "run tiny.json --out out ";
 
@@ -117,5 +116,4 @@ TEST_F(Names, OfFoldersThatCannotBeMadeAreInTheMessage) {
          {"cannot make folder 'kept/a': Permission denied"});
 }
 
-}  // namespace cli_names_test
-}  // namespace loopbench::harness
+}  // namespace loopbench::harness::cli_names_test

@@ -2,15 +2,11 @@
 // with Loopbench are what it writes.
 //
 // To renew them: LOOPBENCH_RENEW_EXPECTED=1 harness_tests --gtest_filter='ShippedLadders*'
-#include <cmath>
-#include <regex>
-
 #include "harness/config/experiment_reader.h"
 #include "harness/config/mechanism_reader.h"
 #include "tests/harness/cli_fixture.h"
 
-namespace loopbench::harness {
-namespace cli_simplify_test {
+namespace loopbench::harness::cli_simplify_test {
 
 const fs::path kModels = kConfigs / "experiments/models";
 
@@ -297,5 +293,4 @@ TEST_F(SimplifyTest, AsksForWhatAVerdictNeeds) {
 
 #endif
 
-}  // namespace cli_simplify_test
-}  // namespace loopbench::harness
+}  // namespace loopbench::harness::cli_simplify_test

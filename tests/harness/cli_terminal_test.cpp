@@ -1,11 +1,8 @@
 // What a person sees on a terminal: tables as wide as it is, colours, progress, Ctrl-C.
-#include <fstream>
-
 #include "tests/harness/cli_fixture.h"
 #include "tests/harness/pseudo_terminal.h"
 
-namespace loopbench::harness {
-namespace cli_terminal_test {
+namespace loopbench::harness::cli_terminal_test {
 
 /// Cells of texts that have Latin letters, marks of U+0300 to U+036F and Chinese characters alone.
 std::size_t Cells(const std::string& text) {
@@ -265,5 +262,4 @@ TEST_F(Streams, OfTheBenchmarkProgramAreHeldToTheSame) {
 
 #endif
 
-}  // namespace cli_terminal_test
-}  // namespace loopbench::harness
+}  // namespace loopbench::harness::cli_terminal_test

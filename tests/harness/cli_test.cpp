@@ -1,10 +1,7 @@
 // The program as its users call it: exit codes, messages, and the files it leaves.
-#include <algorithm>
-
 #include "tests/harness/cli_fixture.h"
 
-namespace loopbench::harness {
-namespace cli_test {
+namespace loopbench::harness::cli_test {
 
 class BadInput : public CommandLineTest {
  protected:
@@ -307,5 +304,4 @@ TEST_F(MapCommandTest, RefusesBadInput) {
   Expect("robustness --help", 0, {"required", "inaccurate", "\"relative_to\": \"rtol\""});
 }
 
-}  // namespace cli_test
-}  // namespace loopbench::harness
+}  // namespace loopbench::harness::cli_test

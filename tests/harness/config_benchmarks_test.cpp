@@ -1,19 +1,10 @@
 // What the reader of configs/benchmarks/ takes and refuses.
-#include <gtest/gtest.h>
-
-#include <filesystem>
-#include <map>
-#include <string>
-#include <vector>
-
-#include "harness/base/text.h"
 #include "harness/config/benchmarks.h"
 #include "harness/run/timing.h"
 #include "mechanism/model/mechanism.h"
 #include "tests/harness/places.h"
 
-namespace loopbench::harness {
-namespace config_benchmarks_test {
+namespace loopbench::harness::config_benchmarks_test {
 
 namespace fs = std::filesystem;
 
@@ -84,9 +75,7 @@ TEST(BenchmarkSet, StatesAreReadStrictly) {
     {"family": "grid", "sizes": 1, "measure": "rhs",
      "methods": [{"formulation": "odca", "enforcement": "velocity"}]}]})";
   const std::string message = MessageOf([&] { ParseBenchmarks(text, folder / "b.json"); });
-  EXPECT_NE(message.find("s.json"), std::string::npos) << message;
-  EXPECT_NE(message.find("/x: found \"short\", expected 16 hexadecimal"), std::string::npos)
-      << message;
+  ExpectWords(message, {"s.json", "/x: found \"short\", expected 16 hexadecimal"});
   const StateHashes states = {{"grid/1/joint", "0123456789abcdef"}};
   WriteFileAtomically(folder / "s.json", StatesToJson(states));
   EXPECT_EQ(ParseBenchmarks(text, folder / "b.json").states, states);
@@ -120,5 +109,4 @@ TEST(Subject, HashesForgiveRoundOffOrNothing) {
   EXPECT_NE(HashExact(a), HashExact(b));
 }
 
-}  // namespace config_benchmarks_test
-}  // namespace loopbench::harness
+}  // namespace loopbench::harness::config_benchmarks_test

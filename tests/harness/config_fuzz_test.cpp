@@ -1,23 +1,9 @@
 // The short form of the fuzzers (tests/fuzz): seeds, broken files and shipped ones, whole, cut
 // short and changed in single places, through the same functions.
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <array>
-#include <cstdlib>
-#include <filesystem>
-#include <fstream>
-#include <iostream>
-#include <random>
-#include <string>
-#include <vector>
-
-#include "harness/base/text.h"
 #include "tests/fuzz/readers.h"
 #include "tests/harness/places.h"
 
-namespace loopbench::fuzz {
-namespace config_fuzz_test {
+namespace loopbench::fuzz::config_fuzz_test {
 
 namespace fs = std::filesystem;
 using harness::kConfigs;
@@ -126,5 +112,4 @@ TEST_P(Readers, AcceptOrRefuseChangedSeeds) {
 INSTANTIATE_TEST_SUITE_P(Kinds, Readers, testing::ValuesIn(kKinds),
                          [](const auto& kind) { return std::string(kind.param); });
 
-}  // namespace config_fuzz_test
-}  // namespace loopbench::fuzz
+}  // namespace loopbench::fuzz::config_fuzz_test

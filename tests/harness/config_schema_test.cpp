@@ -1,17 +1,7 @@
 // The JSON schemas (configs/schema, for editors) against the readers: the same verdict on every
 // shipped file and on every broken one whose fault a schema can see.
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <cstdio>
-#include <filesystem>
-#include <map>
-#include <sstream>
-#include <string>
-#include <vector>
-
 #include "harness/base/file_kind.h"
-#include "harness/base/text.h"
+#include "harness/base/json_document.h"
 #include "harness/config/benchmarks.h"
 #include "harness/config/experiment_reader.h"
 #include "harness/config/mechanism_reader.h"
@@ -19,98 +9,17 @@
 #include "harness/judge/judge.h"
 #include "tests/harness/places.h"
 
-namespace loopbench::harness {
-namespace config_schema_test {
+namespace loopbench::harness::config_schema_test {
 
 namespace fs = std::filesystem;
 
-/// Broken files that the schemas accept, by the reason why a schema cannot see the fault.
-const std::map<std::string_view, std::string_view> kBeyondSchemas = {
-    {"names are compared with names elsewhere in the file",
-     "mechanisms/body-name-twice mechanisms/body-named-ground mechanisms/body-unknown "
-     "mechanisms/joint-name-twice mechanisms/joint-with-itself mechanisms/point-unknown "
-     "mechanisms/point-of-body-without mechanisms/observe-unknown-body "
-     "mechanisms/initial-unknown-joint mechanisms/coupling-name-twice "
-     "mechanisms/coupling-of-free-joint mechanisms/coupling-unknown-joint "
-     "mechanisms/held-without-value mechanisms/independent-component "
-     "mechanisms/independent-owner mechanisms/point-force-on-ground "
-     "experiments/ensemble-unknown-problem experiments/series-unknown-problem "
-     "series/quantity-twice claims/id-twice claims/label-twice maps/column-twice "
-     "maps/row-twice maps/must-hold-unknown maps/must-hold-not-applicable "
-     "maps/not-applicable-unknown experiments/ensemble-unused-tolerance "
-     "experiments/ensemble-between-unheld experiments/problem-twice "
-     "experiments/ensemble-tolerance-of-fixed-steps experiments/exclude-unknown-key "
-     "experiments/sweep-same-name"},
-    {"numbers of either sign, and sizes of a family, have a largest size",
-     "mechanisms/coupling-huge benchmarks/size-too-large"},
-    {"bodies of a force and their points are names, too",
-     "mechanisms/spring-damper-one-body mechanisms/spring-damper-point-unknown "
-     "mechanisms/drag-on-ground"},
-    {"what is right depends on the type of a joint or on the space",
-     "mechanisms/axis-in-plane mechanisms/axis-on-weld mechanisms/force-on-weld "
-     "mechanisms/gravity-out-of-plane mechanisms/decimal-comma mechanisms/initial-of-weld "
-     "mechanisms/spherical-in-plane mechanisms/spherical-quaternion-zero "
-     "mechanisms/spherical-three-angles mechanisms/initial-two-values "
-     "mechanisms/rotation-out-of-plane mechanisms/spring-damper-out-of-plane "
-     "mechanisms/helical-in-plane mechanisms/initial-of-rod mechanisms/motion-and-initial "
-     "mechanisms/motion-coordinate-range mechanisms/motion-coordinate-twice "
-     "mechanisms/motion-list-of-pin-in-slot mechanisms/motion-of-rod "
-     "mechanisms/motion-of-spherical mechanisms/motion-of-weld mechanisms/spatial-not-said "
-     "mechanisms/motion-empty mechanisms/point-out-of-plane"},
-    {"order conditions and sums of rows",
-     "experiments/butcher-embedded-order experiments/butcher-full experiments/butcher-order "
-     "experiments/butcher-row-sum experiments/butcher-sizes"},
-    {"properties of a named integrator or formulation, or of a file",
-     "experiments/butcher-file-broken experiments/butcher-file-missing "
-     "experiments/butcher-without-embedding experiments/integration-explicit "
-     "experiments/integrator-table-misspelt experiments/peer-with-integration "
-     "experiments/atol-beside-precision"},
-    {"parts of a run on their own have no common rows", "experiments/output-islands"},
-    {"what a row of a map lacks may stand in its group", "maps/nothing-decides"},
-    {"endings that decide must be among the right ones", "maps/when-not-right"},
-    {"arithmetic over several numbers",
-     "mechanisms/axis-zero mechanisms/pose-out-of-reach experiments/output-times-fall "
-     "mechanisms/table-lengths mechanisms/table-times-equal mechanisms/motion-table-length "
-     "mechanisms/motion-table-order mechanisms/inertia-indefinite mechanisms/inertia-triangle "
-     "mechanisms/inertia-triangle-turned experiments/range-ends-equal "
-     "experiments/range-log-signs experiments/family-range-rounded-twice "
-     "experiments/ensemble-between-order experiments/family-too-large "
-     "experiments/cases-too-many experiments/sweep-too-many "
-     "experiments/series-one-for-two-problems series/lengths series/times-falling "
-     "series/times-not-rising"},
-    {"equal after expansion, or without effect",
-     "experiments/method-twice experiments/gains-of-position "
-     "experiments/ensemble-matches-nothing experiments/exclude-everything "
-     "experiments/exclude-matches-nothing experiments/exclude-step-of-no-case "
-     "experiments/sweep-value-again experiments/sweep-same-field "
-     "experiments/sweep-zip-lengths benchmarks/benchmark-twice"},
-    {"what a formulation does not have is known to its row",
-     "experiments/peer-plain experiments/peer-at-another-level "
-     "experiments/peer-in-absolute-coordinates experiments/peer-with-fixed-steps "
-     "experiments/peer-with-gains experiments/peer-with-threads benchmarks/peer"},
-    {"a default is that of another section", "experiments/precision-without-tolerances"},
-    {"names of record keys", "experiments/sweep-name-taken"},
-    {"a field is looked up, and its values are read, in the whole document",
-     "experiments/sweep-field-into-number experiments/sweep-field-misspelt "
-     "experiments/sweep-field-unknown experiments/sweep-new-key experiments/sweep-new-point "
-     "experiments/sweep-value-refused"},
-    {"the fault is in another file, or in its absence",
-     "experiments/series-body-unknown experiments/series-joint-unknown "
-     "experiments/series-point-unknown experiments/series-ground "
-     "experiments/series-axis-out-of-plane experiments/series-joint-of-two-coordinates "
-     "experiments/series-missing-file experiments/series-is-a-mechanism "
-     "experiments/mechanism-broken experiments/mechanism-folder "
-     "experiments/mechanism-is-an-experiment experiments/mechanism-missing-file "
-     "experiments/mechanism-no-json experiments/repeated-broken-mechanism "
-     "benchmarks/mechanism-missing-file"},
-    {"a number or character that the validator's own parser takes",
-     "mechanisms/mass-huge mechanisms/number-overflow mechanisms/number-underflow "
-     "mechanisms/lone-surrogate series/number-overflow"}};
-
-/// Returns the names of all of them, each with the space after it.
+/// The names in tests/broken/beyond-schemas.txt, a space before and after each.
 std::string AllBeyondSchemas() {
+  std::istringstream lines(ReadFile(kRoot / "tests/broken/beyond-schemas.txt"));
   std::string all = " ";
-  for (const auto& [reason, names] : kBeyondSchemas) all += std::string(names) + ' ';
+  for (std::string line; std::getline(lines, line);) {
+    if (!line.empty() && line[0] != '#') all += line + ' ';
+  }
   return all;
 }
 
@@ -135,18 +44,42 @@ std::vector<std::string> SchemaVerdicts(const std::string& schema,
   return verdicts;
 }
 
+/// Returns "" or the message of the reader. `file` gives the folder of the files that `text` names;
+/// a series is read from there.
+std::string FaultOf(FileKind kind, const std::string& text, const fs::path& file) {
+  try {
+    if (kind == FileKind::kMechanism) ParseMechanism(text, file.string());
+    if (kind == FileKind::kExperiment) ParseExperiments(text, file);
+    if (kind == FileKind::kClaims) ParseClaims(text, file);
+    if (kind == FileKind::kMap) ParseMapRules(text, file);
+    if (kind == FileKind::kBenchmarks) ParseBenchmarks(text, file);
+    if (kind == FileKind::kSeries) ReadPublishedSeries(file);
+    return "";
+  } catch (const ConfigError& error) {
+    return error.what();
+  }
+}
+
 bool ReaderAccepts(FileKind kind, const fs::path& file) {
   try {
-    if (kind == FileKind::kMechanism) ReadMechanism(file);
-    if (kind == FileKind::kExperiment) ReadExperiments(file);
-    if (kind == FileKind::kClaims) ReadClaims(file);
-    if (kind == FileKind::kMap) ReadMapRules(file);
-    if (kind == FileKind::kBenchmarks) ReadBenchmarks(file);
-    if (kind == FileKind::kSeries) ReadPublishedSeries(file);
-    return true;
+    return FaultOf(kind, ReadTextFile(file), file).empty();
   } catch (const ConfigError&) {
     return false;
   }
+}
+
+/// Returns the arrays and objects within a document, with their places.
+std::vector<std::pair<Json::json_pointer, const Json*>> StructuredIn(
+    const Json& value, const Json::json_pointer& pointer = Json::json_pointer()) {
+  std::vector<std::pair<Json::json_pointer, const Json*>> found = {{pointer, &value}};
+  const auto add = [&](const Json& child, const Json::json_pointer& at) {
+    if (!child.is_structured()) return;
+    std::ranges::move(StructuredIn(child, at), std::back_inserter(found));
+  };
+  for (std::size_t i = 0; value.is_array() && i < value.size(); ++i) add(value[i], pointer / i);
+  if (!value.is_object()) return found;
+  for (const auto& [key, child] : value.items()) add(child, pointer / key);
+  return found;
 }
 
 struct KindOfSchema {
@@ -218,6 +151,44 @@ TEST_P(Schema, RefusesWhatTheReaderRefusesWhereItCanSeeTheFault) {
   EXPECT_GE(refused, GetParam().refused);
 }
 
+// Each array and object of the shipped files, once per place in the schema, is made empty.
+TEST_P(Schema, AgreesWithTheReaderAboutEmptyValues) {
+  const fs::path folder = fs::path(testing::TempDir()) / ("loopbench-empty-" + GetParam().schema);
+  std::set<std::string> done;
+  std::vector<fs::path> files;
+  std::vector<std::string> faults;  // messages of the reader
+  for (const fs::path& shipped : ShippedOf(GetParam().kind)) {
+    const Json whole = ParseDocument(ReadFile(shipped), shipped.string());
+    if (whole.contains("sweep")) continue;  // it replaces values that are never read
+    for (const auto& [pointer, value] : StructuredIn(whole)) {
+      std::string place;  // without indices
+      for (const char c : pointer.to_string()) place += c >= '0' && c <= '9' ? '#' : c;
+      if (value->empty() || !done.insert(place).second) continue;
+      Json changed = whole;
+      changed[pointer] = value->is_array() ? Json::array() : Json::object();
+      // beside the original, because mechanisms are named from there
+      const fs::path file =
+          shipped.parent_path() / fmt::format("{}-empty-{}.json", GetParam().schema, files.size());
+      files.push_back(folder / file.filename());
+      WriteFileAtomically(files.back(), changed.dump());
+      const bool is_series = GetParam().kind == FileKind::kSeries;
+      faults.push_back(FaultOf(GetParam().kind, changed.dump(), is_series ? files.back() : file));
+      const std::size_t at = faults.back().find(pointer.to_string() + ": found an empty");
+      if (at == std::string::npos && !faults.back().empty()) {
+        faults.pop_back();  // the value is missing elsewhere
+        files.pop_back();
+      }
+    }
+  }
+  const std::vector<std::string> verdicts = SchemaVerdicts(GetParam().schema, files);
+  for (std::size_t i = 0; i < files.size(); ++i) {
+    EXPECT_EQ(verdicts[i], faults[i].empty() ? "valid" : "invalid") << ReadFile(files[i]) << '\n'
+                                                                    << faults[i];
+  }
+  EXPECT_GE(files.size(), 2u);
+  fs::remove_all(folder);
+}
+
 INSTANTIATE_TEST_SUITE_P(
     Kinds, Schema,
     testing::Values(KindOfSchema{"mechanism", "mechanisms", FileKind::kMechanism, 30, 30},
@@ -242,5 +213,4 @@ TEST(SchemaExceptions, AreFilesThatExist) {
   }
 }
 
-}  // namespace config_schema_test
-}  // namespace loopbench::harness
+}  // namespace loopbench::harness::config_schema_test

@@ -1,28 +1,12 @@
 // What the readers of harness/config accept: the shipped files and the values they carry.
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <cmath>
-#include <filesystem>
-#include <set>
-#include <string>
-#include <vector>
-
 #include "harness/base/file_kind.h"
-#include "harness/base/text.h"
 #include "harness/config/experiment_reader.h"
-#include "harness/config/mechanism_reader.h"
 #include "harness/judge/judge.h"
 #include "tests/harness/places.h"
 
-namespace loopbench::harness {
-namespace config_test {
+namespace loopbench::harness::config_test {
 
 namespace fs = std::filesystem;
-
-MechanismFile Shipped(const std::string& name) {
-  return ReadMechanism(kConfigs / "mechanisms" / (name + ".json"));
-}
 
 TEST(ShippedMechanisms, AllReadAndBearTheNamesOfTheirFiles) {
   const std::vector<fs::path> files = JsonFilesIn(kConfigs / "mechanisms");
@@ -68,25 +52,7 @@ TEST(ShippedMechanisms, CutEachLoopOnceAtTheJointListedLast) {
 }
 
 TEST(MechanismReader, FillsEveryFieldOfEveryForce) {
-  const MechanismDescription m = ParseMechanism(R"({
-    "name": "m", "gravity": [0, -9.81], "ground": {"points": {"O": [1, 2]}},
-    "bodies": [{"name": "a", "mass": 2, "inertia": 3, "points": {"P": [1, 0]}}],
-    "joints": [{"name": "J", "type": "revolute", "from": {"body": "ground"}, "to": {"body": "a"}}],
-    "forces": [
-      {"type": "joint_spring", "joint": "J", "stiffness": 7, "preload": -2},
-      {"type": "joint_torque", "joint": "J", "value": {"type": "polynomial", "coefficients": [1, 2]}},
-      {"type": "joint_torque", "joint": "J",
-       "value": {"type": "harmonic", "amplitude": 3, "omega": 4, "mean": 5, "phase": 6}},
-      {"type": "joint_torque", "joint": "J",
-       "value": {"type": "table", "times": [0, 1, 3], "values": [4, 5, 4]}},
-      {"type": "joint_torque", "joint": "J", "value": {"type": "table", "times": [0, 1],
-       "values": [4, 5], "interpolation": "linear"}},
-      {"type": "spring_damper", "from": {"body": "ground", "at": "O"}, "to": {"body": "a", "at": "P"},
-       "stiffness": 1, "damping": 2, "length": 3, "preload": -4},
-      {"type": "spring_damper", "from": {"body": "a"}, "to": {"body": "ground"}, "damping": 2},
-      {"type": "drag", "body": "a", "at": [0, 1], "linear": 0.5, "quadratic": 0.25}]})",
-                                                "m.json")
-                                     .description;
+  const MechanismDescription m = ParseMechanism(TestData("every-force.json"), "m.json").description;
   const auto function = [&](int force) {
     return std::get<JointTorque>(m.forces[static_cast<std::size_t>(force)]).value;
   };
@@ -146,26 +112,7 @@ TEST(MechanismReader, TakesInertiasOfBodiesOnly) {
 }
 
 TEST(MechanismReader, FillsEveryFieldOfASpatialMechanism) {
-  const MechanismFile file = ParseMechanism(R"({
-    "name": "m", "comment": "all kinds", "space": "spatial", "gravity": [0, 0, -9.81],
-    "ground": {"points": {"O": [1, 2, 3]}},
-    "bodies": [
-      {"name": "a", "mass": 2, "inertia": [3, 4, 5, 0.1, 0.2, 0.3], "com": [0, 0, 1],
-       "points": {"P": [1, 0]}},
-      {"name": "b", "mass": 1, "inertia": 1}],
-    "joints": [
-      {"name": "J", "type": "prismatic", "from": {"body": "ground", "at": "O"},
-       "to": {"body": "a", "at": [0, 1, 0], "rotation": [0.1, 0, 0]}, "axis": [0, 1, 0]},
-      {"name": "F", "type": "free", "from": {"body": "a", "rotation": 0.5}, "to": {"body": "b"}}],
-    "forces": [
-      {"type": "joint_spring", "joint": "J", "stiffness": 7, "rest": 0.25},
-      {"type": "joint_damper", "joint": "J", "damping": 8},
-      {"type": "joint_torque", "joint": "J", "value": -9},
-      {"type": "point_force", "body": "a", "at": "P", "force": [0, 1, 0], "axes": "body"}],
-    "initial": {"coordinates": {"J": 0.5, "F": [1, 0, 0, 0, 1, 2, 3]},
-                "speeds": {"F": [1, 2, 3, 4, 5, 6]}, "fixed": ["J"]},
-    "independent": ["J", "F.wz", "a.x"]})",
-                                            "m.json");
+  const MechanismFile file = ParseMechanism(TestData("every-field.json"), "m.json");
   const MechanismDescription& m = file.description;
   EXPECT_EQ(m.space, SpaceKind::kSpatial);
   ASSERT_EQ(m.bodies.size(), 3u);
@@ -311,5 +258,4 @@ TEST(EnumNames, ParseReturnsWhatToStringWrote) {
   EXPECT_EQ(Parse<SolverKind>("As-Published"), std::nullopt);
 }
 
-}  // namespace config_test
-}  // namespace loopbench::harness
+}  // namespace loopbench::harness::config_test

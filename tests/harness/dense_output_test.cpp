@@ -1,10 +1,6 @@
 // The solution between steps: its orders, what it leaves alone, and the times it is asked for.
-#include <gtest/gtest.h>
-
-#include <array>
-#include <cmath>
-
 #include "harness/integrator/arkode.h"
+#include "tests/standard.h"
 
 namespace dense_output_test {
 

@@ -1,33 +1,19 @@
 // Choice of the records that differ in a picture with fewer points than records.
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <cmath>
-#include <limits>
-
-#include "harness/base/text.h"
 #include "harness/figures/figures.h"
 #include "tests/harness/records.h"
 
-namespace loopbench::harness {
-namespace distinct_points_test {
+namespace loopbench::harness::distinct_points_test {
 
 constexpr std::size_t kMost = 1000;
 
 Record Point(double x, double y, const std::string& formulation = "odca") {
-  Record record =
-      RecordOf("kind", "accuracy", "formulation", formulation, "outcome", "finished", "steps", x,
-               "energy_error_max", y, "drift_position_max", 1.0);  // nobody asks for it
-  record.Set("mass", 2.0);
-  return record;
+  return RecordOf("kind", "accuracy", "formulation", formulation, "outcome", "finished", "steps", x,
+                  "energy_error_max", y, "drift_position_max", 1.0,  // nobody asks for it
+                  "mass", 2.0);
 }
 
 FreeFigure Wanted() {
-  FreeFigure wanted;
-  wanted.x = "steps";
-  wanted.y = "energy_error_max";
-  wanted.group = "formulation";
-  return wanted;
+  return {.x = "steps", .y = "energy_error_max", .group = "formulation", .log = ""};
 }
 
 TEST(DistinctPoints, AreAllOfFewCutDownToWhatIsDrawn) {
@@ -88,5 +74,4 @@ TEST(DistinctPoints, RefuseWhatCannotBeThinned) {
   EXPECT_THROW(add_curves(), ConfigError);
 }
 
-}  // namespace distinct_points_test
-}  // namespace loopbench::harness
+}  // namespace loopbench::harness::distinct_points_test

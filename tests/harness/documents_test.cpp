@@ -1,13 +1,9 @@
 // Documents: their commands print the output that they show, and reference pages are complete.
-#include <regex>
-#include <set>
-
 #include "harness/judge/analysis.h"
 #include "harness/judge/judge.h"
 #include "tests/harness/cli_fixture.h"
 
-namespace loopbench::harness {
-namespace documents_test {
+namespace loopbench::harness::documents_test {
 
 using DocumentsTest = CommandLineTest;
 
@@ -107,7 +103,7 @@ TEST(Documents, EveryOutcomeAndWarningHasASection) {
   std::vector<std::string> names = {kEnergyWarning,       kSingularWarning, kRegularizedWarning,
                                     kDriftWarning,        kMembersWarning,  kExponentWarning,
                                     kDisagreementWarning, kErrorWarning,    kRefinementWarning,
-                                    kDriveWarning,        kStepsWarning};
+                                    kDriveWarning,        kSpringWarning,   kStepsWarning};
   for (const RunEnding& ending : kRunEndings) names.emplace_back(ending.word);
   for (const std::string& name : names) {
     EXPECT_NE(text.find("\n### `" + name + "`\n"), std::string::npos) << name;
@@ -152,5 +148,4 @@ TEST(Results, TablesAreOfNamedPrograms) {
   }
 }
 
-}  // namespace documents_test
-}  // namespace loopbench::harness
+}  // namespace loopbench::harness::documents_test

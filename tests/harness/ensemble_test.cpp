@@ -1,27 +1,11 @@
 // Ensembles: starts that are drawn far away stay on their branch, and runs that leave it are
 // counted.
-#include <gtest/gtest.h>
-
-#include <cmath>
-#include <limits>
-#include <numbers>
-#include <set>
-
-#include "harness/base/text.h"
-#include "harness/run/run.h"
 #include "mechanism/start/assembly.h"
 #include "tests/reference/cases.h"
 
-namespace loopbench::harness {
-namespace ensemble_test {
+namespace loopbench::harness::ensemble_test {
 
 using namespace reference;
-
-constexpr double kPi = std::numbers::pi;
-
-MechanismDescription Shipped(const std::string& name) {
-  return ReadMechanism(kConfigs / ("mechanisms/" + name + ".json")).description;
-}
 
 Case Drawing(const std::string& joint, double from, double to) {
   Case one;
@@ -46,7 +30,7 @@ double CouplerAngle(const MechanismDescription& description) {
 }
 
 TEST(MemberStart, OfASmallPerturbationIsThePerturbedDescription) {
-  const MechanismDescription description = Shipped("four-bar");
+  const MechanismDescription description = Shipped("four-bar").description;
   Case one;
   one.ensemble = 16;
   one.seed = 5;
@@ -62,7 +46,7 @@ TEST(MemberStart, OfASmallPerturbationIsThePerturbedDescription) {
 }
 
 TEST(MemberStart, IsDrawnBetweenItsBoundsAndTheSameEverywhere) {
-  const MechanismDescription description = Shipped("parallelogram");
+  const MechanismDescription description = Shipped("parallelogram").description;
   const Case one = Drawing("OA", -4.0, 1.0);
   std::set<double> drawn;
   double sum = 0.0;
@@ -81,7 +65,7 @@ TEST(MemberStart, IsDrawnBetweenItsBoundsAndTheSameEverywhere) {
 }
 
 TEST(MemberStart, StaysOnTheBranchThroughPositionsWhereBranchesCross) {
-  const MechanismDescription description = Shipped("parallelogram");
+  const MechanismDescription description = Shipped("parallelogram").description;
   const double coupler = CouplerAngle(description);
   // all round: through both positions with all bars in one line
   const Case one = Drawing("OA", -1.0707963267948966 - kPi, -1.0707963267948966 + kPi);
@@ -98,7 +82,7 @@ TEST(MemberStart, StaysOnTheBranchThroughPositionsWhereBranchesCross) {
 
 TEST(MemberStart, ThatCannotBeReachedSaysSoItself) {
   // bars of 1 m on a ground of 1.5 m: coupler and rocker do not reach a crank that points away
-  MechanismDescription description = Shipped("dead-centre");
+  MechanismDescription description = Shipped("dead-centre").description;
   Case one;
   one.ensemble = 2;
   one.perturb = 0.0;
@@ -197,11 +181,11 @@ Run Member(double branch_start, double branch_error, const std::string& outcome 
 
 TEST(EnsembleTally, CountsFinishedRunsOnTheBranchOfTheUnperturbedOne) {
   EnsembleTally tally(Member(0.5, 0.0), 1e-6);
-  tally.Add(Member(0.5, 1e-6), Shipped("four-bar"));
-  tally.Add(Member(0.5 + 2 * kPi, 1e-9), Shipped("four-bar"));
-  tally.Add(Member(0.5, 2e-6), Shipped("four-bar"));
-  tally.Add(Member(0.5, 1e-9, "singular"), Shipped("four-bar"));
-  tally.Add(Member(1.5, 1e-9), Shipped("four-bar"));
+  tally.Add(Member(0.5, 1e-6), Shipped("four-bar").description);
+  tally.Add(Member(0.5 + 2 * kPi, 1e-9), Shipped("four-bar").description);
+  tally.Add(Member(0.5, 2e-6), Shipped("four-bar").description);
+  tally.Add(Member(0.5, 1e-9, "singular"), Shipped("four-bar").description);
+  tally.Add(Member(1.5, 1e-9), Shipped("four-bar").description);
   Record record;
   tally.Write(record);
   EXPECT_EQ(record.Number("ensemble_size"), 5);
@@ -218,13 +202,12 @@ TEST(EnsembleTally, CountsFinishedRunsOnTheBranchOfTheUnperturbedOne) {
 
 TEST(EnsembleTally, DoesNotLoseAnErrorThatIsNotFinite) {
   EnsembleTally tally(Member(0.5, 0.0), 1e-6);
-  tally.Add(Member(0.5, std::numeric_limits<double>::quiet_NaN()), Shipped("four-bar"));
-  tally.Add(Member(0.5, 1e-9), Shipped("four-bar"));
+  tally.Add(Member(0.5, std::numeric_limits<double>::quiet_NaN()), Shipped("four-bar").description);
+  tally.Add(Member(0.5, 1e-9), Shipped("four-bar").description);
   Record record;
   tally.Write(record);
   EXPECT_TRUE(std::isnan(record.Number("ensemble_branch_error_max")));
   EXPECT_EQ(record.Number("ensemble_branch_kept"), 1);
 }
 
-}  // namespace ensemble_test
-}  // namespace loopbench::harness
+}  // namespace loopbench::harness::ensemble_test

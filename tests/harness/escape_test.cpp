@@ -1,14 +1,10 @@
 // What users name reaches every medium as text and never as an instruction.
-#include <gtest/gtest.h>
-
-#include <set>
-
 #include "harness/base/text.h"
 #include "harness/figures/figures.h"
 #include "harness/judge/tables.h"
+#include "tests/standard.h"
 
-namespace loopbench::harness {
-namespace escape_test {
+namespace loopbench::harness::escape_test {
 
 using namespace std::string_literals;
 
@@ -92,10 +88,10 @@ TEST(Escape, GnuplotShowsAnyText) {
   // a sign belonged to its number
   const std::string text = "''a'' 'b' \"c\" `touch pwned` \\n @d $e %s {f} $100 5\"4 r'12";
   const auto path = std::filesystem::path(testing::TempDir()) / "loopbench-escape.svg";
-  const auto error = DrawWithGnuplot(path, {},
-                                     "set title " + QuoteGnuplot(text) + "\nset xtics (" +
-                                         QuoteGnuplotTick("50% %g %d") +
-                                         " 1)\nplot [0:2] x title " + QuoteGnuplot("''") + "\n");
+  const std::string script = "set title " + QuoteGnuplot(text) + "\nset xtics (" +
+                             QuoteGnuplotTick("50% %g %d") + " 1)\nplot [0:2] x title " +
+                             QuoteGnuplot("''") + "\n";
+  const auto error = DrawWithGnuplot(path, {.page = {}, .script = script});
   ASSERT_FALSE(error) << *error;
   const std::string svg = ReadFile(path);
   EXPECT_NE(svg.find("<text>" + text + "</text>"), std::string::npos) << svg;
@@ -121,5 +117,4 @@ TEST(Escape, FileNamesAreSlugsOfOneComponent) {
   }
 }
 
-}  // namespace escape_test
-}  // namespace loopbench::harness
+}  // namespace loopbench::harness::escape_test

@@ -1,17 +1,10 @@
 // What pilots over a part of the horizon say of the whole.
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <cstdlib>
-#include <string>
-#include <utility>
-
 #include "harness/base/record.h"
 #include "harness/config/experiment_reader.h"
 #include "harness/suite/suite.h"
+#include "tests/standard.h"
 
-namespace loopbench::harness {
-namespace estimate_test {
+namespace loopbench::harness::estimate_test {
 
 TEST(Estimate, ARateGoesOnWithItsSlopeToWhereRunsEnd) {
   const Rate rate = {.running_s = 1.0, .reached = 0.1, .slope_s = 5.0};
@@ -79,5 +72,4 @@ TEST(Estimate, AReferenceThatTakesAWiderScalarHasAPilotOfThatToo) {
 }
 #endif
 
-}  // namespace estimate_test
-}  // namespace loopbench::harness
+}  // namespace loopbench::harness::estimate_test

@@ -1,15 +1,10 @@
 // explain says all that decides a motion: parts, axes in their frames, forces, start, energy.
-#include <fmt/format.h>
-
-#include <regex>
-
 #include "harness/config/mechanism_reader.h"
 #include "harness/judge/analysis.h"
 #include "mechanism/model/kinematics.h"
 #include "tests/harness/cli_fixture.h"
 
-namespace loopbench::harness {
-namespace explain_test {
+namespace loopbench::harness::explain_test {
 
 using ExplainTest = CommandLineTest;
 
@@ -173,5 +168,4 @@ TEST_F(ExplainTest, UnexpectedFreedomEndsWithTwo) {
   }
 }
 
-}  // namespace explain_test
-}  // namespace loopbench::harness
+}  // namespace loopbench::harness::explain_test

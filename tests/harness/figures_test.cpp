@@ -14,7 +14,8 @@
 #include <vector>
 
 #include "harness/base/text.h"
-#include "tests/harness/places.h"
+#include "tests/harness/cli_fixture.h"
+#include "tests/harness/records.h"
 
 namespace loopbench::harness {
 namespace figures_test {
@@ -32,38 +33,17 @@ class FiguresTest : public testing::Test {
 };
 
 Record RunOf(const std::string& formulation, const std::string& coordinates, double exponent) {
-  Record record;
   std::vector<double> t, drift;
   for (int i = 0; i <= 200; ++i) {
     t.push_back(0.05 * i);
     drift.push_back(1e-10 * std::pow(t.back(), exponent));
   }
-  const std::pair<const char*, Value> items[] = {
-      {"mechanism", "four-bar"},
-      {"formulation", formulation},
-      {"enforcement", formulation == "reduction" ? "velocity" : "acceleration"},
-      {"coordinates", coordinates},
-      {"solver", "plain"},
-      {"rtol", 1e-8},
-      {"horizon", 10.0},
-      {"outcome", "finished"},
-      {"t_reached", 10.0},
-      {"growth_exponent", exponent},
-      {"series.t", t},
-      {"series.angle.crank", drift},
-      {"series.angle.rocker", t},
-      {"series.drift_t", t},
-      {"series.drift", drift}};
-  for (const auto& [key, value] : items) record.Set(key, value);
-  return record;
-}
-
-std::size_t Count(const std::string& text, const std::string& part) {
-  std::size_t count = 0;
-  for (std::size_t at = text.find(part); at != std::string::npos; at = text.find(part, at + 1)) {
-    ++count;
-  }
-  return count;
+  return RecordOf("mechanism", "four-bar", "formulation", formulation, "enforcement",
+                  formulation == "reduction" ? "velocity" : "acceleration", "coordinates",
+                  coordinates, "solver", "plain", "rtol", 1e-8, "horizon", 10.0, "outcome",
+                  "finished", "t_reached", 10.0, "growth_exponent", exponent, "series.t", t,
+                  "series.angle.crank", drift, "series.angle.rocker", t, "series.drift_t", t,
+                  "series.drift", drift);
 }
 
 TEST_F(FiguresTest, DriftHasUnitsChannelsAndFittedPowers) {
@@ -81,8 +61,8 @@ TEST_F(FiguresTest, DriftHasUnitsChannelsAndFittedPowers) {
             "<text>1.97</text>", "<text>2.20?</text>", "<text>1.03</text>", "?: not resolved",
             "<text>lagrange</text>", "<text>velocity</text>", "<text>absolute</text>"});
   // through the data, over the window of the fit: drift is 1e-10 t^1.97
-  ExpectWords(GnuplotScript(figure).commands, {"[1:10] 1e-10*(x/1)**(1.97) with lines"});
-  EXPECT_EQ(Count(GnuplotScript(figure).commands, "**(2.2)"), 0u) << "not resolved";
+  ExpectWords(GnuplotScript(figure).script, {"[1:10] 1e-10*(x/1)**(1.97) with lines"});
+  EXPECT_EQ(CountOf(GnuplotScript(figure).script, "**(2.2)"), 0u) << "not resolved";
 }
 
 TEST_F(FiguresTest, ValuesThatALogarithmicAxisCannotShowAreSkipped) {
@@ -92,38 +72,36 @@ TEST_F(FiguresTest, ValuesThatALogarithmicAxisCannotShowAreSkipped) {
   figure.curves.push_back(
       {.label = "some", .x = {0.0, 1.0, 2.0, 3.0, 4.0}, .y = {1.0, 0.0, nan, 5.0, 7.0}});
   figure.curves.push_back({.label = "none", .x = {1.0}, .y = {0.0}});
-  ExpectWords(GnuplotScript(figure).commands, {"$c0 << EOD\n3 5\n4 7\nEOD\n"});
+  ExpectWords(GnuplotScript(figure).script, {"$c0 << EOD\n3 5\n4 7\nEOD\n"});
   ExpectWords(Draw(figure), {"<text>some</text>", "<text>none</text>"});
 }
 
 TEST_F(FiguresTest, AFailedRunEndsInACrossAndIsNamed) {
-  Record failed = RunOf("lagrange", "joint", 2.0);
-  failed.Set("outcome", std::string("singular"));
-  failed.Set("t_reached", 1.25);
+  const Record failed =
+      Changed(RunOf("lagrange", "joint", 2.0), "outcome", "singular", "t_reached", 1.25);
   const std::string svg =
-      Draw(SingularFigure(std::vector<Record>{RunOf("odca", "joint", 2.0), failed}));
+      Draw(DriftFigure(std::vector<Record>{RunOf("odca", "joint", 2.0), failed}, true));
   ExpectWords(svg, {"<text>singular at 1.25 s</text>", "xlink:href='#gpPt1'", "×: failed run"});
-  EXPECT_EQ(Count(svg, "fitted powers"), 0u);
+  EXPECT_EQ(CountOf(svg, "fitted powers"), 0u);
 }
 
 TEST_F(FiguresTest, ARunThatFailsAtItsStartHasACrossOnTheAxisAndTakesNoWidth) {
   std::vector<Record> records = {RunOf("odca", "joint", 2.0), RunOf("lagrange", "joint", 2.0),
                                  RunOf("reduction", "joint", 2.0)};
+  const std::vector<double> none;
   for (std::size_t i = 1; i < records.size(); ++i) {
-    records[i].Set("outcome", std::string("singular"));
-    records[i].Set("t_reached", 0.0);
-    records[i].Set("series.drift_t", std::vector<double>{});
-    records[i].Set("series.drift", std::vector<double>{});
+    records[i] = Changed(records[i], "outcome", "singular", "t_reached", 0.0, "series.drift_t",
+                         none, "series.drift", none);
   }
-  const std::string right = GnuplotScript(SingularFigure(std::span(records).first(1))).commands;
-  const std::string script = GnuplotScript(SingularFigure(records)).commands;
+  const std::string right = GnuplotScript(DriftFigure(std::span(records).first(1), true)).script;
+  const std::string script = GnuplotScript(DriftFigure(records, true)).script;
   // in the colours of both, one above the other
   ExpectWords(script, {"at first 0, graph 0.03 point pt 2 ps 0.45 lw 1.2 lc rgb '#BB5566'",
                        "at first 0, graph 0.06 point pt 2 ps 0.45 lw 1.2 lc rgb '#DDAA33'",
                        "failed run (singular at 0 s)"});
   ExpectWords(script, {right.substr(right.find("set rmargin"), 30)});
   // a logarithmic axis of time has no zero: there the cross is in the corner
-  ExpectWords(GnuplotScript(DriftFigure(records)).commands, {"at graph 0, graph 0.03 point"});
+  ExpectWords(GnuplotScript(DriftFigure(records)).script, {"at graph 0, graph 0.03 point"});
 }
 
 TEST_F(FiguresTest, LongSeriesKeepTheirExtremes) {
@@ -136,8 +114,8 @@ TEST_F(FiguresTest, LongSeriesKeepTheirExtremes) {
   curve.y[77777] = 3.0;
   curve.y[123456] = -4.0;
   figure.curves.push_back(curve);
-  const std::string script = GnuplotScript(figure).commands;
-  EXPECT_LT(Count(script, "\n"), 6500u) << "four points in each third of a point's width";
+  const std::string script = GnuplotScript(figure).script;
+  EXPECT_LT(CountOf(script, "\n"), 6500u) << "four points in each third of a point's width";
   ExpectWords(script, {"\n77.777 3\n", "\n123.456 -4\n", "\n200 "});
 }
 
@@ -153,13 +131,10 @@ TEST_F(FiguresTest, WithoutGnuplotOrPointsThereIsAReasonAndNoFile) {
 }
 
 TEST(FigureRecipes, OneFigureOfMotionPerProblemAndOneOfDriftPerTolerance) {
-  Record coarse = RunOf("odca", "joint", 2.0);
-  coarse.Set("rtol", 1e-6);
-  Record singular = RunOf("odca", "joint", 2.0);
-  singular.Set("mechanism", std::string("a name that says nothing"));
-  singular.Set("singularity_distance_min", 1e-3);
+  const Record run = RunOf("odca", "joint", 2.0);
   const std::vector<NamedFigure> figures = AllFigures(std::vector<Record>{
-      RunOf("lagrange", "joint", 2.0), RunOf("odca", "joint", 2.0), coarse, singular});
+      RunOf("lagrange", "joint", 2.0), run, Changed(run, "rtol", 1e-6),
+      Changed(run, "mechanism", "a name that says nothing", "singularity_distance_min", 1e-3)});
   std::string names;
   for (const NamedFigure& figure : figures) names += figure.name + " ";
   EXPECT_EQ(names,
@@ -176,14 +151,12 @@ std::string TitleOfMotion(const std::vector<Record>& records) {
 
 TEST(FigureRecipes, MotionIsThatOfTheRunThatIsTrustedMost) {
   const Record drifting = RunOf("odca", "joint", 2.0);
-  Record closed = RunOf("lagrange", "absolute", 2.0);
-  closed.Set("enforcement", std::string("projection"));
-  closed.Set("rtol", 1e-6);
+  Record closed =
+      Changed(RunOf("lagrange", "absolute", 2.0), "enforcement", "projection", "rtol", 1e-6);
   const std::string position = "four-bar, lagrange, projection, absolute, plain, rtol ";
   EXPECT_EQ(TitleOfMotion({drifting, closed}), position + "10⁻⁶");
   EXPECT_EQ(TitleOfMotion({closed, drifting}), position + "10⁻⁶");
-  Record finer = closed;
-  finer.Set("rtol", 1e-10);
+  Record finer = Changed(closed, "rtol", 1e-10);
   EXPECT_EQ(TitleOfMotion({finer, closed, drifting}), position + "10⁻¹⁰");
   finer.Set("energy_error_relative", 0.5);
   EXPECT_EQ(TitleOfMotion({finer, closed, drifting}), position + "10⁻⁶");
@@ -207,18 +180,16 @@ TEST_F(FiguresTest, DisplacementsHaveAPanelOfTheirOwnInMetres) {
   EXPECT_EQ(both.below[0].curves[0].label, "slider");
   ExpectWords(Draw(both), {"angle [rad]", "displacement [m]", "<text>slider</text>",
                            "<text>crank</text>", "<text>rocker</text>"});
-  Record slider;
-  slider.Set("series.t", record.Numbers("series.t"));
-  slider.Set("series.displacement.slider", record.Numbers("series.t"));
+  const std::vector<double>& times = record.Numbers("series.t");
+  const Record slider = RecordOf("series.t", times, "series.displacement.slider", times);
   EXPECT_EQ(MotionFigure(slider).y_label, "displacement [m]");
   EXPECT_TRUE(MotionFigure(slider).below.empty());
 }
 
 TEST(FigureRecipes, AMotionTooFastForThePointsIsShownByItsOpening) {
-  Record record = RunOf("odca", "joint", 2.0);
-  record.Set("series.opening_t", std::vector<double>{0.0, 0.1, 0.2});
-  record.Set("series.opening.angle.crank", std::vector<double>{0.0, 1.0, 0.0});
-  const Figure figure = MotionFigure(record);
+  const Figure figure = MotionFigure(
+      Changed(RunOf("odca", "joint", 2.0), "series.opening_t", std::vector<double>{0.0, 0.1, 0.2},
+              "series.opening.angle.crank", std::vector<double>{0.0, 1.0, 0.0}));
   EXPECT_TRUE(figure.title.ends_with("(the first 0.2 of 10 s)")) << figure.title;
   ASSERT_EQ(figure.curves.size(), 1u);
   EXPECT_EQ(figure.curves[0].label, "crank");
@@ -232,10 +203,9 @@ std::vector<Record> AllMethods() {
     for (const std::string level : {"acceleration", "velocity", "projection", "baumgarte"}) {
       for (const char* coordinates : {"joint", "absolute"}) {
         for (const char* solver : {"plain", "rank-revealing"}) {
-          records.push_back(
-              RunOf(formulation, coordinates, 1.0 + 0.1 * static_cast<double>(records.size())));
-          records.back().Set("enforcement", level);
-          records.back().Set("solver", std::string(solver));
+          const double exponent = 1.0 + 0.1 * static_cast<double>(records.size());
+          records.push_back(Changed(RunOf(formulation, coordinates, exponent), "enforcement", level,
+                                    "solver", solver));
         }
       }
     }
@@ -305,19 +275,19 @@ TEST_F(FiguresTest, EveryLetterHasItsMeaningInTheLegend) {
     const std::string svg = ReadFile(folder_ / "figure.svg");
     std::size_t letters = 0;
     for (char letter = 'A'; letter <= 'Z'; ++letter) {
-      if (Count(svg, fmt::format("<text>{} ", letter)) == 0) continue;
+      if (CountOf(svg, fmt::format("<text>{} ", letter)) == 0) continue;
       ++letters;
       // the label may begin on the next line
-      EXPECT_GT(Count(svg, fmt::format("{}: ", letter)) + Count(svg, fmt::format("{}:<", letter)),
-                0u)
+      EXPECT_GT(
+          CountOf(svg, fmt::format("{}: ", letter)) + CountOf(svg, fmt::format("{}:<", letter)), 0u)
           << letter;
     }
-    const FigureScript script = GnuplotScript(figure, size);
+    const Drawing script = GnuplotScript(figure, size);
     if (size == FigureSize::kOneColumn) {
       EXPECT_LE(script.legend_rows, kLegendRows);
     } else {
       EXPECT_GT(letters, 12u) << "the wider size has them all";
-      EXPECT_EQ(Count(svg, "…"), 0u);
+      EXPECT_EQ(CountOf(svg, "…"), 0u);
     }
     EXPECT_GE(script.legend_rows, 4u) << "formulations, levels, coordinates, what coincides";
   }
@@ -443,11 +413,11 @@ TEST_F(FiguresTest, HostileNamesAreDrawnAsTheyAre) {
 
 TEST_F(FiguresTest, FlaggedRunsHaveHollowMarks) {
   std::vector<Record> records = {RunOf("odca", "absolute", 2.0), RunOf("reduction", "joint", 2.5)};
-  EXPECT_EQ(Count(Draw(DriftFigure(records)), "flagged"), 0u);
+  EXPECT_EQ(CountOf(Draw(DriftFigure(records)), "flagged"), 0u);
   records[1].Set("warnings", std::string("drift"));
   ExpectWords(Draw(DriftFigure(records)), {"<text>flagged</text>"});
   for (const Figure& figure : {DriftFigure(records), MotionFigure(records[1])}) {
-    ExpectWords(GnuplotScript(figure).commands, {"with points pt 6 "});
+    ExpectWords(GnuplotScript(figure).script, {"with points pt 6 "});
   }
 }
 

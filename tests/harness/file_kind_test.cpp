@@ -3,8 +3,7 @@
 
 #include "tests/harness/cli_fixture.h"
 
-namespace loopbench::harness {
-namespace file_kind_test {
+namespace loopbench::harness::file_kind_test {
 
 class FileKindTest : public CommandLineTest {
  protected:
@@ -92,5 +91,4 @@ TEST_F(FileKindTest, AFileOfAnotherKindIsNamed) {
          {"found an experiment (it has \"problems\"), expected claims"});
 }
 
-}  // namespace file_kind_test
-}  // namespace loopbench::harness
+}  // namespace loopbench::harness::file_kind_test

@@ -1,11 +1,6 @@
 // Formulations by name: those that come with Loopbench, and one that a program adds.
 #include "harness/config/formulations.h"
 
-#include <gtest/gtest.h>
-
-#include <stdexcept>
-
-#include "harness/base/text.h"
 #include "harness/figures/figures.h"
 #include "harness/judge/tables.h"
 #include "harness/suite/suite.h"
@@ -13,8 +8,7 @@
 #include "tests/harness/in_child.h"
 #include "tests/reference/cases.h"
 
-namespace loopbench::harness {
-namespace formulations_test {
+namespace loopbench::harness::formulations_test {
 
 using Names = std::vector<std::string>;
 
@@ -141,5 +135,4 @@ TEST(FormulationsTest, RunsInSeveralScalarsKnowTheBuiltInOnes) {
   });
 }
 
-}  // namespace formulations_test
-}  // namespace loopbench::harness
+}  // namespace loopbench::harness::formulations_test

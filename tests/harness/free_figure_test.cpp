@@ -1,38 +1,16 @@
 // A figure of any value against any other: labels, scales, curves, and nothing dropped.
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <cmath>
-#include <filesystem>
-#include <limits>
-#include <set>
-#include <string>
-#include <utility>
-#include <vector>
-
-#include "harness/base/text.h"
 #include "harness/figures/figures.h"
 #include "tests/harness/cli_fixture.h"
 #include "tests/harness/in_child.h"
+#include "tests/harness/records.h"
 
-namespace loopbench::harness {
-namespace free_figure_test {
+namespace loopbench::harness::free_figure_test {
 
 Record RunOf(const std::string& formulation, double rtol, double drift) {
-  const std::pair<const char*, Value> items[] = {
-      {"kind", "accuracy"},
-      {"mechanism", "four-bar"},
-      {"formulation", formulation},
-      {"rtol", rtol},
-      {"horizon", 10.0},
-      {"steps", 100},
-      {"outcome", "finished"},
-      {"drift_position_max", drift},
-      {"series.drift_t", std::vector{0.0, 0.1, 10.0}},
-      {"series.drift", std::vector{0.0, drift / 2, drift}}};
-  Record record;
-  for (const auto& [key, value] : items) record.Set(key, value);
-  return record;
+  return RecordOf("kind", "accuracy", "mechanism", "four-bar", "formulation", formulation, "rtol",
+                  rtol, "horizon", 10.0, "steps", 100, "outcome", "finished", "drift_position_max",
+                  drift, "series.drift_t", std::vector{0.0, 0.1, 10.0}, "series.drift",
+                  std::vector{0.0, drift / 2, drift});
 }
 
 std::vector<Record> Runs() {
@@ -103,10 +81,8 @@ TEST(FreeFigure, PointsThatALogarithmicAxisCannotShowAreGapsAndCounted) {
 TEST(FreeFigure, FailedRunsAreCrossesWithOrWithoutAValue) {
   std::vector<Record> runs = Runs();
   runs[1].Set("outcome", "singular");  // with a drift
-  Record never = RunOf("odca", 1e-12, 0.0);
-  never.Set("outcome", "inconsistent-start");
-  never.Set("drift_position_max", Value());
-  runs.push_back(never);
+  runs.push_back(Changed(RunOf("odca", 1e-12, 0.0), "outcome", "inconsistent-start",
+                         "drift_position_max", Value()));
   const FreeFigureResult result = MakeFreeFigure(runs, DriftOverTolerance());
   const Curve& odca = result.figure.curves[1];
   EXPECT_EQ(odca.x, (std::vector<double>{1e-8, 1e-6}));
@@ -116,7 +92,7 @@ TEST(FreeFigure, FailedRunsAreCrossesWithOrWithoutAValue) {
   EXPECT_EQ(odca.crosses[1], (std::pair{1e-10, 1e-8}));
   EXPECT_EQ(result.remarks,
             std::vector<std::string>{"2 of 6 runs failed and are drawn as crosses"});
-  const std::string script = GnuplotScript(result.figure).commands;
+  const std::string script = GnuplotScript(result.figure).script;
   ExpectPart(script, "at first 1e-12, graph 0.03 point pt 2");
   ExpectPart(script, "at first 1e-10, first 1e-08 point pt 2");
   ExpectPart(script, "failed run");
@@ -132,7 +108,7 @@ TEST(FreeFigure, FlaggedRunsAreHollowAndCounted) {
   EXPECT_TRUE(values.figure.curves[0].hollow.empty());  // lagrange
   EXPECT_EQ(values.figure.curves[1].hollow,
             (std::vector<std::pair<double, double>>{{1e-10, 1e-8}}));
-  ExpectPart(GnuplotScript(values.figure).commands, "$c1h with points pt");
+  ExpectPart(GnuplotScript(values.figure).script, "$c1h with points pt");
   ASSERT_EQ(values.remarks.size(), 1u);
   EXPECT_EQ(values.remarks[0].find("1 of 5 runs finished with warnings"), 0u) << values.remarks[0];
   const FreeFigureResult series = MakeFreeFigure(
@@ -162,7 +138,7 @@ TEST(FreeFigure, CurvesThatCoincideAreOneBlackCurveWithBothNames) {
   const Figure joined = FigureOf(runs);
   EXPECT_EQ(LabelsDrawn(joined), names);
   EXPECT_EQ(MergedCurves(joined, FigureSize::kTwoColumn)[0].style.color, "#000000");
-  ExpectPart(GnuplotScript(joined).commands, "\"lagrange = odca\"");
+  ExpectPart(GnuplotScript(joined).script, "\"lagrange = odca\"");
   // flagged runs keep their hollow marks, failed ones their crosses, in the colour of each
   runs[0].Set("warnings", "energy");
   runs[4].Set("warnings", "energy");
@@ -192,12 +168,12 @@ TEST(FreeFigure, CurvesThatCoincideAreOneBlackCurveWithBothNames) {
 
 TEST(FreeFigure, LabelsReplaceTextsOfAxesAndCurvesAndATitleTheTitle) {
   FreeFigure wanted = DriftOverTolerance();
-  const double titled = GnuplotScript(FigureOf(Runs())).height;
+  const double titled = GnuplotScript(FigureOf(Runs())).page.height;
   wanted.title = "";
   wanted.labels = {"rtol=relative tolerance", "odca=O-DCA", "drift_position_max="};
   const Figure figure = FigureOf(Runs(), wanted);
   EXPECT_EQ(figure.title, "");
-  EXPECT_LT(GnuplotScript(figure).height, titled) << "nor does it take a line";
+  EXPECT_LT(GnuplotScript(figure).page.height, titled) << "nor does it take a line";
   EXPECT_EQ(figure.x_label, "relative tolerance");
   EXPECT_EQ(figure.y_label, "");
   EXPECT_EQ(figure.curves[0].label, "lagrange");
@@ -227,12 +203,10 @@ TEST(FreeFigure, CloudsOfPointsDifferByColourAndMark) {
   std::vector<Record> runs;
   for (const char* level : {"acceleration", "velocity", "projection"}) {
     for (const double drift : {1.0, 2.0}) {
-      runs.push_back(RunOf("odca", 1e-6, drift));
-      runs.back().Set("enforcement", std::string(level));
+      runs.push_back(Changed(RunOf("odca", 1e-6, drift), "enforcement", level));
     }
   }
-  runs.push_back(RunOf("odca", 1e-8, 1.0));
-  runs.back().Set("drift_position_max", Value());
+  runs.push_back(Changed(RunOf("odca", 1e-8, 1.0), "drift_position_max", Value()));
   FreeFigure wanted = DriftOverTolerance();
   wanted.group = "enforcement";
   const FreeFigureResult result = MakeFreeFigure(runs, wanted);
@@ -256,7 +230,7 @@ TEST(FreeFigure, TextsOnTheHorizontalAxisAreNamedTicks) {
   EXPECT_EQ(figure.curves[0].label, "10⁻¹⁰");
   EXPECT_EQ(figure.curves[0].x, (std::vector<double>{2}));
   EXPECT_FALSE(figure.log_x);
-  ExpectPart(GnuplotScript(figure).commands, "(\"lagrange\" 1, \"odca\" 2)");
+  ExpectPart(GnuplotScript(figure).script, "(\"lagrange\" 1, \"odca\" 2)");
 }
 
 TEST(FreeFigure, TwoSeriesGiveACurvePerRecordAndALabelPerGroup) {
@@ -318,5 +292,4 @@ TEST(FreeFigure, SvgHasTheSameBytesEachTimeAndPdfIsOne) {
   EXPECT_TRUE(ReadFile(folder / "a.pdf").starts_with("%PDF-"));
 }
 
-}  // namespace free_figure_test
-}  // namespace loopbench::harness
+}  // namespace loopbench::harness::free_figure_test

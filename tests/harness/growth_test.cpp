@@ -194,21 +194,21 @@ TEST(Growth, DriftBelowTheFloorIsRoundOffWithoutExponent) {
   EXPECT_FALSE(growth.resolved);
 }
 
-// Twenty samples in all leave ten in the late window, fewer than the sixteen required.
-TEST(Growth, FewSamplesAreTooShort) {
-  const Growth growth = AnalyseGrowth(PowerLaw(2, 1e-9, kMembers, kEnd, 20), kEnd, 1);
-  EXPECT_EQ(growth.regime, "too-short");
-  EXPECT_TRUE(std::isnan(growth.exponent));
-  EXPECT_FALSE(growth.resolved);
-}
-
-// Saturation at once leaves windows that end near their start.
-TEST(Growth, WindowShorterThanAFactorOfFourIsTooShort) {
-  // above the floor from 30 s on, above a tenth of the length from 60 s on
-  const std::vector<DriftSeries> runs(kMembers, Sample([](double t) {
-                                        return t < 30 ? 0 : t < 60 ? 1e-3 * t : 1;
-                                      }));
-  EXPECT_EQ(AnalyseGrowth(runs, kEnd, 1).regime, "too-short");
+// Twenty samples in all leave ten in the late window, fewer than the sixteen required. Saturation
+// at once (above the floor from 30 s on, above a tenth of the length from 60 s on) leaves windows
+// that end near their start, less than a factor of four.
+TEST(Growth, FewSamplesShortWindowsAndNoRunsAreTooShort) {
+  const std::vector<DriftSeries> saturated(kMembers, Sample([](double t) {
+                                             return t < 30 ? 0 : t < 60 ? 1e-3 * t : 1;
+                                           }));
+  for (const std::vector<DriftSeries>& runs :
+       {PowerLaw(2, 1e-9, kMembers, kEnd, 20), saturated, std::vector<DriftSeries>()}) {
+    const Growth growth = AnalyseGrowth(runs, kEnd, 1);
+    EXPECT_EQ(growth.regime, "too-short");
+    EXPECT_EQ(growth.members, static_cast<int>(runs.size()));
+    EXPECT_TRUE(std::isnan(growth.exponent));
+    EXPECT_FALSE(growth.resolved);
+  }
 }
 
 TEST(Growth, OneRunHasNoSpreadAndResolvesNothing) {
@@ -218,13 +218,6 @@ TEST(Growth, OneRunHasNoSpreadAndResolvesNothing) {
   EXPECT_TRUE(std::isnan(growth.spread_late));
   EXPECT_FALSE(growth.resolved);
   EXPECT_EQ(growth.members, 1);
-}
-
-TEST(Growth, NoRunsAreTooShort) {
-  const Growth growth = AnalyseGrowth({}, kEnd, 1);
-  EXPECT_EQ(growth.members, 0);
-  EXPECT_EQ(growth.regime, "too-short");
-  EXPECT_FALSE(growth.resolved);
 }
 
 // A run that fails at 40 s shortens the windows of all, so that every fit covers the same times.

@@ -1,20 +1,12 @@
 // A history in a folder of its own, and what is added to it.
 #pragma once
 
-#include <gtest/gtest.h>
-
-#include <cstdint>
-#include <filesystem>
-#include <string>
-#include <vector>
-
 #include "harness/base/record.h"
 #include "harness/base/text.h"
 #include "harness/history/history.h"
 #include "tests/harness/records.h"
 
-namespace loopbench::harness {
-namespace history_test {
+namespace loopbench::harness::history_test {
 
 namespace fs = std::filesystem;
 
@@ -40,13 +32,6 @@ inline std::string Date(int number) {
 
 class HistoryOf : public testing::Test {
  protected:
-  void SetUp() override {
-    const auto* test = testing::UnitTest::GetInstance()->current_test_info();
-    folder_ = fs::path(testing::TempDir()) / (std::string("loopbench-history-") + test->name());
-    fs::remove_all(folder_);
-  }
-  void TearDown() override { fs::remove_all(folder_); }
-
   HistoryEntry Add(int number, const std::vector<Record>& records, bool replaces = false) {
     return AddToHistory(folder_, {.commit = CommitName(number), .date = Date(number)}, records,
                         replaces);
@@ -57,8 +42,8 @@ class HistoryOf : public testing::Test {
     return message.empty() ? "taken" : message;
   }
 
-  fs::path folder_;
+  const TemporaryFolder temporary_{"loopbench-history"};
+  const fs::path folder_ = temporary_.path() / "history";
 };
 
-}  // namespace history_test
-}  // namespace loopbench::harness
+}  // namespace loopbench::harness::history_test

@@ -1,20 +1,8 @@
 // Steps planted in 200 commits, on machines as they are.
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <cmath>
-#include <cstdio>
-#include <fstream>
-#include <map>
-#include <random>
-#include <sstream>
-
-#include "harness/history/history.h"
 #include "harness/judge/judge.h"
 #include "tests/harness/history_of.h"
 
-namespace loopbench::harness {
-namespace history_test {
+namespace loopbench::harness::history_test {
 
 constexpr std::size_t kCommits = 200, kCases = 8;
 using ByCase = std::vector<std::vector<double>>;  ///< [case][commit]
@@ -213,6 +201,15 @@ TEST_F(PlantedHistory, EachCaseHasItsOwnChanges) {
   }
 }
 
+// The median of three is free of the change of one.
+TEST_F(PlantedHistory, ThreeCasesShowTheirCommonVariation) {
+  for (unsigned seed = 0; seed < 3; ++seed) {
+    const auto found = ChangesIfDoubled(folder_, 3, 1, 0.005, 0.2, seed);
+    ASSERT_EQ(found.size(), 1u) << seed;
+    EXPECT_NEAR(found.begin()->second[0], 2.0, 0.02) << seed;  // with the common noise: 0.07 off
+  }
+}
+
 TEST_F(PlantedHistory, OneCaseIsNotAllCases) {
   for (unsigned seed = 0; seed < 5; ++seed) {
     const auto found = ChangesIfDoubled(folder_, 6, 1, 0.03, 0.0, seed);
@@ -272,5 +269,4 @@ TEST_F(PlantedHistory, WithoutACalibrationASharedMachineHidesThem) {
   EXPECT_LE(false_alarms_.size(), 2u) << testing::PrintToString(false_alarms_);
 }
 
-}  // namespace history_test
-}  // namespace loopbench::harness
+}  // namespace loopbench::harness::history_test

@@ -1,21 +1,9 @@
 // Measurements over commits: what is kept and refused, which state is a base, series and their
 // steps, and the page that shows them.
-#include "harness/history/history.h"
-
-#include <gtest/gtest.h>
-
-#include <cmath>
-#include <set>
-#include <string>
-#include <vector>
-
 #include "harness/base/store.h"
-#include "harness/base/text.h"
 #include "tests/harness/history_of.h"
-#include "tests/harness/records.h"
 
-namespace loopbench::harness {
-namespace history_test {
+namespace loopbench::harness::history_test {
 
 std::vector<double> ValuesOf(const HistorySeries& series) {
   return Mapped<double>(series.values, &HistoryValue::value);
@@ -33,7 +21,7 @@ TEST_F(HistoryOf, CommitsStandInTheOrderOfTheirDates) {
     }
   }
   // series of a run stay behind, samples of times do not
-  EXPECT_EQ(ReadFile(history.entries[0].results).find("series.t"), std::string::npos);
+  ExpectNone(ReadFile(history.entries[0].results), {"series.t"});
 }
 
 TEST_F(HistoryOf, WhatIsNoMeasurementIsRefused) {
@@ -386,7 +374,7 @@ TEST_F(HistoryOf, PageSaysNamesAsText) {
   MarkInHistory(folder_, {CommitName(2), "accepted", hostile});
   const History history = ReadHistory(folder_);
   const std::string page = HistoryPage(history, FindingsOf(history), hostile, {hostile});
-  EXPECT_EQ(page.find("<img"), std::string::npos);
+  ExpectNone(page, {"<img"});
   ExpectWords(page, {"&lt;img"});
   // a row with a small line and a chart of each series, which a filter finds by its text
   ExpectWords(page, {"<tr class=\"series\"><td>", "<svg class=\"spark\""});
@@ -394,5 +382,4 @@ TEST_F(HistoryOf, PageSaysNamesAsText) {
   ExpectWords(page, {"dataset.theme = dark.matches"});
 }
 
-}  // namespace history_test
-}  // namespace loopbench::harness
+}  // namespace loopbench::harness::history_test

@@ -1,13 +1,8 @@
 // <attach> of MJCF: models of other files, and copies of bodies, with prefixed names.
-#include <fmt/format.h>
-#include <gtest/gtest.h>
-
-#include "harness/base/text.h"
 #include "harness/config/mechanism_reader.h"
 #include "tests/harness/import_texts.h"
 
-namespace loopbench::harness {
-namespace import_mjcf_attach_test {
+namespace loopbench::harness::import_mjcf_attach_test {
 
 using ImportMjcfAttach = ModelFolder;
 
@@ -172,6 +167,22 @@ TEST_F(ImportMjcfAttach, CopiesAreAttachedToo) {
   EXPECT_EQ(dampers[0].damping, 2.0);
 }
 
+TEST_F(ImportMjcfAttach, ManyModelsTakeTimeInProportion) {
+  Write("arm.xml", "<mujoco model='arm'>" + kDefaults + "<worldbody>" +
+                       Arm("", "", "class='soft'") + "</worldbody>" + ArmParts("") + "</mujoco>");
+  const auto seconds = [&](int count) {
+    std::string models;
+    for (int i = 0; i < count; ++i) models += fmt::format("<attach model='arm' prefix='p{}_'/>", i);
+    Write("main.xml", "<mujoco><asset><model name='arm' file='arm.xml'/></asset><worldbody>" +
+                          models + "</worldbody></mujoco>");
+    const std::clock_t begin = std::clock();
+    EXPECT_EQ(Read().description.bodies.size(), 2u * static_cast<std::size_t>(count) + 1u);
+    return static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC;
+  };
+  const double few = seconds(2000);
+  EXPECT_LT(seconds(16000), 16.0 * few + 0.1);  // 8 times as many; quadratic work: 25 times as long
+}
+
 TEST_F(ImportMjcfAttach, FaultsOfCopiesAreNamed) {
   const auto world = [&](const std::string& text) {
     Write("main.xml", "<mujoco><worldbody>\n" + text + "</worldbody></mujoco>");
@@ -275,5 +286,4 @@ TEST_F(ImportMjcfAttach, FaultsAreNamed) {
   ExpectMessage({"at most 16 nested files"});
 }
 
-}  // namespace import_mjcf_attach_test
-}  // namespace loopbench::harness
+}  // namespace loopbench::harness::import_mjcf_attach_test

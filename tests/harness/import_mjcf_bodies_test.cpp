@@ -1,16 +1,9 @@
 // Bodies of MJCF: where they stand, their joints, masses and weights.
-#include <gtest/gtest.h>
-
-#include <numbers>
-
 #include "tests/harness/import_texts.h"
 
-namespace loopbench::harness {
-namespace import_mjcf_bodies_test {
+namespace loopbench::harness::import_mjcf_bodies_test {
 
 using namespace import_mjcf_texts;
-
-constexpr double kPi = std::numbers::pi;
 
 TEST(ImportMjcf, AnglesAreDegreesUnlessTheCompilerSaysRadians) {
   for (const bool degrees : {true, false}) {
@@ -40,7 +33,6 @@ TEST(ImportMjcf, OrientationsAreTheSameInAllForms) {
   }
   const Imported z = Read("<joint/>", "", "", "zaxis='1 0 0'");
   ExpectNear(PoseOf(z.description.joints[0].from).R.col(2), Eigen::Vector3d::UnitX(), 10 * kEps);
-  ExpectRefusal(Model("", "", "", "quat='1 0 0 0' euler='0 0 0'"), {"one orientation"});
 }
 
 /// The types that joints on one body become, from the outermost.
@@ -87,12 +79,6 @@ TEST(ImportMjcf, JointsOnOneBodyBecomeJointsOfMechanisms) {
   EXPECT_EQ(TypeOfChain(x + y + z + a + b), "translation universal");
   EXPECT_EQ(TypeOfChain(c + skew + away + a + b + c), "revolute revolute revolute spherical");
   EXPECT_EQ(Read(x + y + z + a + b).description.bodies[2].name, "b link");
-  for (const std::string& repeated : {a + a, x + x, x + y + x, ball + ball}) {
-    ExpectRefusal(Model(repeated), {"file.xml:1", "without mass that moves, between"});
-  }
-  ExpectRefusal(Model(x + y + z + a + b + c + x), {"found joints with 7 degrees of freedom"});
-  ExpectRefusal(Model("<freejoint/>" + c),
-                {"file.xml:1", "2 joints on one body, one of them free"});
 }
 
 TEST(ImportMjcf, ShapesHaveTheMassesOfSolids) {
@@ -151,7 +137,6 @@ TEST(ImportMjcf, TheCompilerChangesMasses) {
   const std::string flat =
       "<worldbody><body><joint/><inertial pos='0 0 0' mass='1' diaginertia='1 1 "
       "4'/></body></worldbody></mujoco>";
-  ExpectRefusal("<mujoco>" + flat, {"principal moments 1, 1, 4", "sum of the other two"});
   const Imported balanced = ImportOf("<mujoco><compiler balanceinertia='true'/>" + flat);
   EXPECT_NEAR(balanced.description.bodies[1].inertia(2, 2), 2.0, kEps);
 }
@@ -186,7 +171,6 @@ TEST(ImportMjcf, ShellsThatAreFixedAreAccepted) {
            "</body></body></worldbody></mujoco>";
   };
   EXPECT_EQ(Refusal(model("")), "");
-  ExpectRefusal(model("<joint/>"), {"shellinertia: found 'true'"});
 }
 
 /// Where a joint stands in the body that it moves, which the file draws at the origin, and its
@@ -318,5 +302,4 @@ TEST(ImportMjcf, MeshesAreExactIfTheCompilerSaysSo) {
   EXPECT_GT(mass(""), 0.5);
 }
 
-}  // namespace import_mjcf_bodies_test
-}  // namespace loopbench::harness
+}  // namespace loopbench::harness::import_mjcf_bodies_test

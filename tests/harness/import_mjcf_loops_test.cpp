@@ -1,16 +1,9 @@
 // What closes loops in MJCF, and tendons.
-#include <gtest/gtest.h>
-
-#include <numbers>
-
 #include "tests/harness/import_texts.h"
 
-namespace loopbench::harness {
-namespace import_mjcf_loops_test {
+namespace loopbench::harness::import_mjcf_loops_test {
 
 using namespace import_mjcf_texts;
-
-constexpr double kPi = std::numbers::pi;
 
 TEST(ImportMjcf, EqualitiesCloseLoopsWhereTheFileDrawsThem) {
   const Imported connect =
@@ -87,10 +80,6 @@ TEST(ImportMjcf, WeldsOfSitesMakeTheirFramesCoincide) {
   // a connect holds the points alone
   const Imported connect = ImportOf(model("<connect site1='s1' site2='s2'/>"));
   EXPECT_TRUE(connect.description.joints.back().to.rotation.isZero(0.0));
-  const std::string place = "file.xml:2: <weld>";
-  ExpectRefusal(model("<weld site1='s1'/>"), {place + ": found no 'site2'"});
-  ExpectRefusal(model("<weld site1='s1' site2='s1'/>"), {place + ": found one body twice"});
-  ExpectRefusal(model("<weld site1='s1' site2='x'/>"), {place + " site2: found 'x'"});
 }
 
 TEST(ImportMjcf, TendonsBetweenTwoSitesAreSpringsOrRods) {
@@ -168,10 +157,6 @@ TEST(ImportMjcf, TwoFixedTendonsAreOneCoupling) {
   EXPECT_TRUE(same.description.couplings.empty());
   ExpectNote(same, "<tendon name='e'>", "all coefficients are 0");
   EXPECT_EQ(same.notes.size(), 1u);
-  ExpectRefusal(model("tendon1='sprin'"), {"<tendon name='e'> tendon1: found 'sprin'",
-                                           "name of a tendon (did you mean 'spring'?)"});
-  ExpectRefusal(model("tendon1='t' tendon2='x'"), {"tendon2: found 'x'"});
-  ExpectRefusal(model(""), {"found no 'tendon1'"});
 }
 
 TEST(ImportMjcf, RangesOfSpringsMatterWithAForceOnly) {
@@ -183,7 +168,6 @@ TEST(ImportMjcf, RangesOfSpringsMatterWithAForceOnly) {
            "><site site='s0'/><site site='s1'/></spatial></tendon></mujoco>";
   };
   const std::string off = "<option><flag spring='disable'/></option>", stiff = "stiffness='1'";
-  ExpectRefusal(model("", stiff, "<joint/>"), {"one length"});
   EXPECT_EQ(Refusal(model("", "damping='1'", "<joint/>")), "");
   EXPECT_EQ(Refusal(model(off, stiff, "<joint/>")), "");
   const Imported fixed = ImportOf(model("", stiff, ""));
@@ -233,5 +217,4 @@ TEST(ImportMjcf, WhatTendonsSayAndNobodyReadsHasANote) {
   EXPECT_TRUE(tendon("armature='0'").notes.empty());
 }
 
-}  // namespace import_mjcf_loops_test
-}  // namespace loopbench::harness
+}  // namespace loopbench::harness::import_mjcf_loops_test

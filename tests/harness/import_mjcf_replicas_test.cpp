@@ -1,14 +1,8 @@
 // <replicate> of MJCF: copies in place, their names, and the elements that refer to them.
-#include <fmt/format.h>
-#include <gtest/gtest.h>
-
-#include <numbers>
-
 #include "harness/config/mechanism_reader.h"
 #include "tests/harness/import_texts.h"
 
-namespace loopbench::harness {
-namespace import_mjcf_replicas_test {
+namespace loopbench::harness::import_mjcf_replicas_test {
 
 const std::string kMass = "<inertial pos='0 0 0' mass='2' diaginertia='1 1 1'/>";
 
@@ -145,37 +139,4 @@ TEST(ImportMjcfReplicas, NotesCountOnce) {
   ExpectNote(imported, "<key>", "one replica");
 }
 
-TEST(ImportMjcfReplicas, FaultyReplicatesAreRefused) {
-  const auto refuse = [](const std::string& attributes, const std::vector<std::string>& words) {
-    ExpectRefusal(Mujoco("<replicate " + attributes + ">" + Body("b", "<joint/>") + "</replicate>"),
-                  words);
-  };
-  refuse("", {"file.xml:2: <replicate>: found no 'count'", "1 to 100000"});
-  for (const char* count : {"0", "-1", "1e9", "2.5", "nan", "1 2", ""}) {
-    refuse(std::string("count='") + count + "'", {"<replicate> count: found"});
-  }
-  refuse("count='2' offset='1 0'", {"<replicate> offset", "3 numbers"});
-  refuse("count='2' euler='1 inf 0'", {"<replicate> euler"});
-  refuse("count='2' sep='123456789012345678901234567890123'", {"<replicate> sep", "32 bytes"});
-  refuse("count='100000'", {"more than 100000 elements of replicas"});
-  std::string nested = Body("b", "<joint/>");
-  for (int i = 0; i < 17; ++i) nested = "<replicate count='1'>" + nested + "</replicate>";
-  ExpectRefusal(Mujoco(nested), {"more than 16 nested <replicate>"});
-  nested = Body("b", "<joint/>");
-  for (int i = 0; i < 16; ++i) nested = "<replicate count='9'>" + nested + "</replicate>";
-  ExpectRefusal(Mujoco(nested), {"more than 100000 elements of replicas"});
-  ExpectRefusal(Mujoco(Body("a", "<replicate count='2'><joint/></replicate>")),
-                {"<joint>: found a joint in a <replicate>"});
-  const std::string two = "<replicate count='2' offset='1 0 0'>" + Body("a", "<joint name='j'/>") +
-                          "</replicate><replicate count='2' offset='0 1 0'>" +
-                          Body("b", "<joint name='k'/>") + "</replicate>";
-  ExpectRefusal(Mujoco(two, "<equality><joint joint1='j' joint2='k'/></equality>"),
-                {"<joint> joint2: found 'k'", "names in one <replicate>"});
-  ExpectRefusal(Mujoco(two, "<actuator><motor joint='z'/></actuator>"), {"found 'z'"});
-  ExpectRefusal(Mujoco(two + Body("a0", "<joint/>")), {"a second body of this name"});
-  ExpectRefusal(Mujoco("<attach/>" + two), {"<attach>: found an element that stands for other"});
-  ExpectRefusal(Mujoco(two, "<tendon><replicate/></tendon>"), {"stands for other"});
-}
-
-}  // namespace import_mjcf_replicas_test
-}  // namespace loopbench::harness
+}  // namespace loopbench::harness::import_mjcf_replicas_test

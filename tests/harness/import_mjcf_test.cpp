@@ -1,31 +1,12 @@
 // MJCF as a whole: classes of defaults, what is dropped, what is refused.
-#include <gtest/gtest.h>
-
-#include <set>
-
 #include "tests/harness/import_texts.h"
 
-namespace loopbench::harness {
-namespace import_mjcf_test {
+namespace loopbench::harness::import_mjcf_test {
 
 using namespace import_mjcf_texts;
 
 TEST(ImportMjcf, ClassesOfDefaultsAreNestedAndInherited) {
-  const Imported imported = ImportOf(R"(<mujoco>
-    <default>
-      <joint damping="1"/>
-      <default class="stiff"><joint stiffness="5"/>
-        <default class="stiffest"><joint damping="3"/></default>
-      </default>
-    </default>
-    <worldbody>
-      <body name="a"><inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/><joint name="plain"/></body>
-      <body name="b" childclass="stiff"><inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>
-        <joint name="child"/>
-        <body name="c"><inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>
-          <joint name="own" class="stiffest" stiffness="7"/></body>
-      </body>
-    </worldbody></mujoco>)");
+  const Imported imported = ImportOf(TestData("classes.xml"));
   const auto dampers = ForcesOf<JointDamper>(imported);
   const auto springs = ForcesOf<JointSpring>(imported);
   ASSERT_EQ(dampers.size(), 3u);
@@ -39,16 +20,7 @@ TEST(ImportMjcf, ClassesOfDefaultsAreNestedAndInherited) {
 
 TEST(ImportMjcf, PlanarMechanismsHaveGravityAlongMinusY) {
   const ImportOptions options{.planar = true};
-  const Imported imported = ImportOf(R"(<mujoco><worldbody>
-      <site name="w" pos="1 0 0.5"/>
-      <body name="b" pos="0 0.25 0"><joint name="j" axis="0 1 0" stiffness="1" springref="30"/>
-        <geom size="0.1" pos="0 0 1"/><site name="s" pos="0 -0.25 1"/></body>
-      <body name="c" pos="2 0 0"><joint name="k" axis="0 -1 0"/><geom size="0.1" pos="0 0 1"/></body>
-    </worldbody>
-    <equality><connect body1="b" body2="c" anchor="0 0 1"/></equality>
-    <tendon><spatial stiffness="2"><site site="w"/><site site="s"/></spatial></tendon>
-    <keyframe><key qpos="0.5 -0.5"/></keyframe></mujoco>)",
-                                     options);
+  const Imported imported = ImportOf(TestData("planar.xml"), options);
   const MechanismDescription& planar = imported.description;
   EXPECT_EQ(planar.space, SpaceKind::kPlanar);
   ExpectNear(planar.gravity, {0, -9.81, 0}, 1e-14);
@@ -65,31 +37,7 @@ TEST(ImportMjcf, PlanarMechanismsHaveGravityAlongMinusY) {
 }
 
 TEST(ImportMjcf, EveryKindOfDroppedElementHasItsNote) {
-  const Imported imported = ImportOf(R"(<mujoco>
-  <option timestep="0.1" density="1.2" integrator="RK4"/>
-  <asset><mesh name="m" file="m.stl"/></asset>
-  <default><joint frictionloss="0.2"/></default>
-  <worldbody>
-    <light pos="0 0 1"/>
-    <geom name="floor" type="plane" size="1 1 1"/>
-    <body name="b" mocap="true" strange="1">
-      <joint name="j" armature="0.1" range="-1 1" springdamper="1 1"/>
-      <geom name="g" size="0.1"/>
-      <camera name="c"/>
-      <unknown/>
-    </body>
-    <body name="w"><joint name="l" type="ball" damping="1" stiffness="1" armature="0.2"/><geom size="0.1"/></body>
-  </worldbody>
-  <contact><exclude body1="b" body2="w"/></contact>
-  <sensor><gyro site="s"/></sensor>
-  <extension><plugin plugin="p"/></extension>
-  <deformable/>
-  <equality><flex flex="f"/></equality>
-  <tendon><fixed name="f" damping="1"><joint joint="l" coef="1"/></fixed></tendon>
-  <actuator><general joint="j"/></actuator>
-  <keyframe><key/><key name="later"/></keyframe>
-  <surprise/>
-</mujoco>)");
+  const Imported imported = ImportOf(TestData("dropped-elements.xml"));
   ExpectNote(imported, "<option> timestep", "their own steps");
   ExpectNote(imported, "<option> density", "no medium");
   ExpectNote(imported, "<option> integrator", "their own integrator");
@@ -128,32 +76,6 @@ TEST(ImportMjcf, DefaultsOfMeshesWithoutUseHaveNoNote) {
   EXPECT_FALSE(HasNote(imported, "<mesh>", ""));
 }
 
-TEST(ImportMjcf, WhatCannotBeSaidIsRefusedWithItsLine) {
-  ExpectRefusal("<mujoco>\n<include file='x.xml'/>\n<worldbody/></mujoco>",
-                {"file.xml:2: <include>", "the whole model in one file"});
-  ExpectRefusal("<mujoco>\n<compiler coordinate='global'/><worldbody/></mujoco>",
-                {"file.xml:2: <compiler> coordinate: found 'global'", "local"});
-  ExpectRefusal("<mujoco/>", {"file.xml:1: <mujoco>: found no <worldbody>"});
-  ExpectRefusal("<mujoco><worldbody/></mujoco>", {"found no body"});
-  ExpectRefusal("<mujoco><worldbody><body name='b'><joint/></body></worldbody></mujoco>",
-                {"<body name='b'>: found a body without mass that moves"});
-  ExpectRefusal(Model("<joint axis='0 0 0'/>"), {"<joint> axis", "not zero"});
-  ExpectRefusal(Model("<joint type='screw'/>"), {"hinge, slide, ball, free"});
-  ExpectRefusal(Model("<joint class='none'/>"), {"'none'", "described in <default>"});
-  ExpectRefusal(Model("<joint name='j'/><joint name='j' axis='1 0 0'/>"), {"second joint"});
-  ExpectRefusal(Model("<joint/>", "", "<equality><connect body1='x' anchor='0 0 0'/></equality>"),
-                {"<connect> body1: found 'x'", "name of a body"});
-  ExpectRefusal(Model("<joint/>", "", "<keyframe><key qpos='1 2'/></keyframe>"),
-                {"<key> qpos", "1 number"});
-  ExpectRefusal(
-      "<mujoco><worldbody><body><joint/><geom type='mesh' mesh='m'/></body></worldbody></mujoco>",
-      {"mesh: found 'm'", "the name of a mesh"});
-  for (const char* number : {"nan", "inf", "1e999", "1,0", "0x10", "1e", "", "1 2"}) {
-    ExpectRefusal(Model("<joint damping='" + std::string(number) + "'/>"), {"damping: found"});
-  }
-  ExpectRefusal(Model("<joint damping='-1'/>"), {"a number >= 0"});
-}
-
 TEST(ImportMjcf, DefaultsAtTheTopAreThoseOfAllWhateverTheirName) {
   // MuJoCo before 3.2; later ones refuse other names than main
   const auto forces = [](const std::string& defaults, const std::string& attributes = "") {
@@ -169,28 +91,6 @@ TEST(ImportMjcf, DefaultsAtTheTopAreThoseOfAllWhateverTheirName) {
                    "stiffness='4'/></default></default>",
                    "class='x'"),
             2u);
-  ExpectRefusal(Model("<joint/>", "<default class='base'>\n<default class='base'/></default>"),
-                {"file.xml:2: <default> class: found 'base'", "not described yet"});
-  ExpectRefusal(
-      Model("<joint/>", "<default><default class='base'/></default>\n<default class='base'/>"),
-      {"file.xml:2: <default> class: found 'base'", "not described yet"});
-}
-
-TEST(ImportMjcf, OtherFilesAreRefusedWhereverTheyAreIncluded) {
-  const std::string include = "\n<include file='x.xml'/>";
-  const auto refused = [](const std::string& before, const std::string& after = "") {
-    ExpectRefusal(Model("<joint/>", before, after),
-                  {"file.xml:2: <include>", "the whole model in one file"});
-  };
-  refused("<compiler>" + include + "</compiler>");
-  refused("<option>" + include + "</option>");
-  refused("<option><flag>" + include + "</flag></option>");
-  refused("<default>" + include + "</default>");
-  refused("<default><default class='x'><joint>" + include + "</joint></default></default>");
-  for (const char* tag : {"equality", "tendon", "actuator", "keyframe", "worldbody"}) {
-    refused("", "<" + std::string(tag) + ">" + include + "</" + tag + ">");
-  }
-  refused("", "<tendon><spatial>" + include + "</spatial></tendon>");
 }
 
 TEST(ImportMjcf, GravityInThePlaneIsAlongYToTheLastBit) {
@@ -245,5 +145,4 @@ TEST(ImportMjcf, PartsThatAreDisabledDoNotChangeTheMotion) {
   EXPECT_EQ(flagged("<option wind='1 0 0' viscosity='1'/>"), all);
 }
 
-}  // namespace import_mjcf_test
-}  // namespace loopbench::harness
+}  // namespace loopbench::harness::import_mjcf_test

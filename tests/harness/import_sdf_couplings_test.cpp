@@ -1,14 +1,7 @@
 // Joints of SDF that follow others: <mimic>, and joints of type gearbox and screw.
-#include <gtest/gtest.h>
-
-#include <numbers>
-
 #include "tests/harness/import_texts.h"
 
-namespace loopbench::harness {
-namespace import_sdf_couplings_test {
-
-constexpr double kPi = std::numbers::pi;
+namespace loopbench::harness::import_sdf_couplings_test {
 
 std::string Sdf(const std::string& inside) {
   return "<sdf version='1.11'>\n<model name='m'>\n" + inside + "</model></sdf>";
@@ -67,29 +60,7 @@ TEST(ImportSdfCouplings, MimicsOfSeveralCoordinatesAreDropped) {
   ExpectNote(follower("<axis/><axis2><mimic joint='j'/></axis2>"), "<mimic>", "no such axis");
 }
 
-TEST(ImportSdfCouplings, FaultyMimicsAreRefused) {
-  ExpectRefusal(Follower("<mimic/>"), {"file.xml:5: <mimic>: found no 'joint'", "a joint"});
-  ExpectRefusal(Follower("<mimic joint=''/>"), {"<mimic> joint: found ''"});
-  ExpectRefusal(Follower("<mimic joint='z'/>"), {"<mimic> joint: found 'z'", "in this file"});
-  ExpectRefusal(Follower("<mimic joint='f'/>"), {"<mimic>: found a joint that follows itself"});
-  ExpectRefusal(Follower("<mimic joint='j' axis='axis3'/>"),
-                {"<mimic> axis: found 'axis3'", "one of axis, axis2"});
-  ExpectRefusal(Follower("<mimic joint='j' axis='axis2'/>"),
-                {"<mimic> axis: found 'axis2'", "no second one"});
-  for (const char* value : {"multiplier", "offset", "reference"}) {
-    const std::string tag = value;
-    for (const char* text : {"nan", "inf", "1 2", "", "x"}) {
-      ExpectRefusal(Follower("<mimic joint='j'><" + tag + ">" + text + "</" + tag + "></mimic>"),
-                    {"<" + tag + ">: found '" + text + "'"});
-    }
-  }
-  ExpectRefusal(
-      Follower(
-          "<mimic joint='j'><multiplier>1e300</multiplier><reference>1e300</reference></mimic>"),
-      {"file.xml", "f mimic", "the offset must be finite"});
-}
-
-TEST(ImportSdfCouplings, CyclesOfMimicsAreRefused) {
+TEST(ImportSdfCouplings, MimicsMayFollowEachOtherInAnyOrder) {
   std::string links, joints;
   for (int i = 0; i < 5; ++i) {
     const std::string n = std::to_string(i), leader = std::to_string((i + 3) % 5);
@@ -99,12 +70,6 @@ TEST(ImportSdfCouplings, CyclesOfMimicsAreRefused) {
   }
   // 0 follows 3, 1 follows 4, 2 follows 0, 3 follows 1
   EXPECT_EQ(Read(links + joints).description.couplings.size(), 4u);
-  const std::string last = "type='revolute'><parent>world</parent><child>l4</child><axis/>";
-  std::string cycle = joints;
-  cycle.replace(
-      cycle.find(last), last.size(),
-      "type='revolute'><parent>world</parent><child>l4</child><axis><mimic joint='j2'/></axis>");
-  ExpectRefusal(Sdf(links + cycle), {"<mimic>: found joints that follow each other", "no cycle"});
 }
 
 /// Two shafts on a moving base; `b` is turned by a quarter about y, and the base carries a mount.
@@ -156,28 +121,6 @@ TEST(ImportSdfCouplings, JointsToTheReferenceBodyTurnItTheOtherWay) {
   ExpectNote(imported, "<joint name='g'>", "no <axis2>");
 }
 
-TEST(ImportSdfCouplings, GearboxesWithoutTwoHingesAreRefused) {
-  const auto refuse = [](const std::string& text, const std::vector<std::string>& words) {
-    ExpectRefusal(Sdf(text), words);
-  };
-  refuse(Shafts(Gearbox("<gearbox_ratio>0</gearbox_ratio>")),
-         {"<gearbox_ratio>: found '0'", "not 0"});
-  refuse(Shafts(Gearbox("<gearbox_ratio>nan</gearbox_ratio>")), {"<gearbox_ratio>: found 'nan'"});
-  refuse(Shafts(SdfJoint("g", "gearbox", "a", "b")), {"no <gearbox_reference_body>"});
-  refuse(Shafts(Gearbox("", "none")), {"<gearbox_reference_body>", "'none', which is not there"});
-  refuse(Shafts(Gearbox("", "base", "")), {"<joint name='g'>: found no <axis>"});
-  refuse(Shafts(Gearbox("", "base", "<axis><xyz>0 1 0</xyz></axis><axis2/>")),
-         {"<parent>: found 'a', which no hinge or screw about this axis joins"});
-  refuse(Shafts(Gearbox("", "base", "<axis><xyz>-1 0 0</xyz></axis>")),
-         {"<child>: found 'b', which no hinge"});
-  refuse(Shafts(Gearbox("", "world")), {"<parent>: found 'a', which no hinge"});
-  refuse(Shafts(Gearbox("", "a")), {"<parent>: found 'a', which no hinge"});
-  refuse(Shafts(SdfJoint("g", "gearbox", "a", "a",
-                         "<axis/><gearbox_reference_body>base</gearbox_reference_body>")),
-         {"found a joint that follows itself"});
-  refuse(Shafts(SdfJoint("ja", "gearbox", "a", "b")), {"a second 'ja'"});
-}
-
 TEST(ImportSdfCouplings, ThreadsOfScrews) {
   const auto screw = [](const std::string& inside) {
     return Link("a") + SdfJoint("j", "screw", "world", "a", "<axis/>" + inside);
@@ -186,12 +129,6 @@ TEST(ImportSdfCouplings, ThreadsOfScrews) {
   const Imported both =
       Read(screw("<thread_pitch>7</thread_pitch><screw_thread_pitch>0.5</screw_thread_pitch>"));
   EXPECT_EQ(both.description.joints[0].parameter, 0.5 / (2 * kPi));
-  for (const char* tag : {"thread_pitch", "screw_thread_pitch"}) {
-    for (const char* text : {"0", "nan", "inf", "", "1 1"}) {
-      ExpectRefusal(Sdf(screw(std::string("<") + tag + ">" + text + "</" + tag + ">")),
-                    {std::string("<") + tag + ">: found"});
-    }
-  }
 }
 
 TEST(ImportSdfCouplings, FollowersStartWhereLeadersPlaceThem) {
@@ -216,5 +153,4 @@ TEST(ImportSdfCouplings, FollowersStartWhereLeadersPlaceThem) {
   ExpectNote(moved, "<link name='b'>", "starts at 1");
 }
 
-}  // namespace import_sdf_couplings_test
-}  // namespace loopbench::harness
+}  // namespace loopbench::harness::import_sdf_couplings_test

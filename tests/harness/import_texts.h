@@ -2,13 +2,6 @@
 // and expected words may have ' in place of ".
 #pragma once
 
-#include <gtest/gtest.h>
-
-#include <Eigen/Geometry>
-#include <algorithm>
-#include <string>
-#include <vector>
-
 #include "harness/base/text.h"
 #include "harness/exchange/import.h"
 #include "mechanism/description/joint_frames.h"

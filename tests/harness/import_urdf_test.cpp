@@ -1,13 +1,7 @@
 // What becomes of each element of URDF, and of a sidecar.
-#include <gtest/gtest.h>
-
-#include <filesystem>
-
-#include "harness/base/text.h"
 #include "tests/harness/import_texts.h"
 
-namespace loopbench::harness {
-namespace import_urdf_test {
+namespace loopbench::harness::import_urdf_test {
 
 const std::string kMass =
     "<inertial><mass value='2'/><inertia ixx='1' iyy='1' izz='1'/></inertial>";
@@ -73,7 +67,7 @@ TEST(ImportUrdf, InertiaIsTurnedIntoTheAxesOfTheLink) {
   EXPECT_NEAR(body.inertia(0, 1), -0.1, 1e-15);
 }
 
-TEST(ImportUrdf, LinksWithoutMassAreMergedOrRefused) {
+TEST(ImportUrdf, LinksWithoutMassAreMerged) {
   // base - (fixed) - hub - (hinge) - arm - (fixed) - tool, and a sensor frame on a frame on it
   const std::string tree = Link("base", "") + Link("arm") + Link("tool", "") + Link("eye", "") +
                            Joint("shoulder", "continuous", "base", "arm", "<origin xyz='0 0 1'/>") +
@@ -94,10 +88,6 @@ TEST(ImportUrdf, LinksWithoutMassAreMergedOrRefused) {
                      Joint("bolt", "fixed", "hub", "load", "<origin xyz='0 2 0'/>")));
   ASSERT_EQ(carried.description.bodies.size(), 2u);
   EXPECT_EQ(JointNamed(carried, "turn").to.position, Eigen::Vector3d(0, -2, 0));
-  ExpectRefusal(Robot(Link("world", "") + "\n" + Link("hub", "") + Link("load") +
-                      Joint("turn", "continuous", "world", "hub") +
-                      Joint("swing", "continuous", "hub", "load")),
-                {"file.xml:3: <link name='hub'>: found a body without mass that moves"});
 }
 
 TEST(ImportUrdf, TheRootIsFixedUnlessItFloats) {
@@ -193,7 +183,6 @@ TEST(ImportUrdf, RotorsOfTransmissionsMoveWithTheirJoints) {
   ExpectNote(ImportOf(robot("floating")), "<transmission> drake:rotor_inertia",
              "only joints with one coordinate");
   EXPECT_FALSE(HasNote(ImportOf(robot("fixed")), "rotor_inertia", ""));
-  ExpectRefusal(robot("fixed", "i"), {"<joint name='i'> name: found 'i'"});
 }
 
 TEST(ImportUrdf, LinksThatAreFixedNeedNoInertia) {
@@ -202,7 +191,6 @@ TEST(ImportUrdf, LinksThatAreFixedNeedNoInertia) {
                  Link("b") + Joint("i", type, "world", "a") + Joint("j", "continuous", "a", "b"));
   };
   EXPECT_EQ(Refusal(robot("fixed")), "");
-  ExpectRefusal(robot("continuous"), {"<inertial>: found no <inertia>"});
 }
 
 TEST(ImportUrdf, MimicsAreCouplings) {
@@ -220,8 +208,6 @@ TEST(ImportUrdf, MimicsAreCouplings) {
   EXPECT_EQ(imported.description.initial.coordinates[0].values, std::vector<double>{0.1});
   EXPECT_FALSE(HasNote(imported, "<mimic>", ""));
   EXPECT_EQ(ImportOf(robot("<mimic joint='j'/>")).description.couplings[0].parts[1].ratio, -1.0);
-  ExpectRefusal(robot("<mimic joint='z'/>"), {"<mimic> joint: found 'z'", "a joint in this file"});
-  ExpectRefusal(robot("<mimic joint='k'/>"), {"<mimic>: found a joint that follows itself"});
   const Imported fixed = ImportOf(Robot(Link("world", "") + Link("a") + Link("b") +
                                         Joint("j", "continuous", "world", "a") +
                                         Joint("k", "fixed", "a", "b", "<mimic joint='j'/>")));
@@ -229,47 +215,8 @@ TEST(ImportUrdf, MimicsAreCouplings) {
   EXPECT_TRUE(std::ranges::none_of(fixed.notes, &ImportNote::changes_motion));
 }
 
-TEST(ImportUrdf, CyclesOfMimicsAreRefused) {
-  const auto joint = [](const std::string& name, const std::string& leader) {
-    return Joint(name, "continuous", "world", "l" + name, "<mimic joint='" + leader + "'/>") +
-           Link("l" + name) + "\n";
-  };
-  ExpectRefusal(Robot(Link("world", "") + joint("a", "b") + joint("b", "c") + joint("c", "a")),
-                {"file.xml:4: <mimic>: found joints that follow each other", "no cycle"});
-}
-
-TEST(ImportUrdf, WhatIsNoTreeIsRefusedWithItsLine) {
-  const std::string a = Link("a") + "\n", b = Link("b") + "\n", c = Link("c") + "\n";
-  ExpectRefusal(Robot(a + a), {"file.xml:3: <link name='a'>", "line 2 has it"});
-  ExpectRefusal(Robot(a + Joint("j", "continuous", "a", "z")),
-                {"<child> link: found 'z'", "name of a body"});
-  ExpectRefusal(Robot(a + b), {"2 links without a parent"});
-  ExpectRefusal(Robot(a + b + c + Joint("j", "continuous", "b", "c") + "\n" +
-                      Joint("k", "continuous", "c", "b")),
-                {"file.xml:5: <joint name='j'>: found a joint of a cycle", "--loops"});
-  ExpectRefusal(Robot(a + b + c + Joint("j", "continuous", "a", "b") +
-                      Joint("k", "continuous", "a", "c") + Joint("l", "continuous", "b", "c")),
-                {"<joint name='l'>: found a second joint that leads to this child"});
-  ExpectRefusal(
-      Robot(a + b + Joint("j", "continuous", "a", "b") + Joint("j", "continuous", "a", "b")),
-      {"second joint"});
-  ExpectRefusal(Robot(a + b + Joint("j", "screw", "a", "b")), {"'screw'", "one of revolute"});
-  ExpectRefusal(
-      Robot(Link("world", "") +
-            Link("a", "<inertial><mass value='-1'/><inertia ixx='1' iyy='1' izz='1'/></inertial>")),
-      {"<mass> value: found '-1'", ">= 0"});
-  ExpectRefusal(
-      Robot(Link("world", "") +
-            Link("a", "<inertial><mass value='1'/><inertia ixx='1' iyy='-1' izz='1'/></inertial>") +
-            Joint("j", "continuous", "world", "a")),
-      {"principal moments -1"});
-  ExpectRefusal("<robot name='r'/>", {"no link without a parent"});
-  ExpectRefusal("<robot name='r' xmlns:xacro='http://ros.org/wiki/xacro'>" + Link("world", "") +
-                    Link("b") + Joint("j", "fixed", "world", "b") +
-                    "<xacro:include filename='x'/></robot>",
-                {"an element of xacro"});
-  ExpectRefusal(Robot(a), {"found urdf, expected sdf"}, {.format = "sdf"});
-  ExpectRefusal("<html/>", {"file.xml:1: <html>", "<mujoco> (MJCF), <robot> (URDF) or <sdf>"});
+TEST(ImportUrdf, AnotherFormatIsRefused) {
+  ExpectRefusal(Robot(Link("a")), {"found urdf, expected sdf"}, {.format = "sdf"});
 }
 
 /// A sidecar beside a chain of two links of 1 m along x at rest.
@@ -329,5 +276,4 @@ TEST_F(Sidecar, MistakesHaveTheirPlace) {
   expect("{", "file");
 }
 
-}  // namespace import_urdf_test
-}  // namespace loopbench::harness
+}  // namespace loopbench::harness::import_urdf_test

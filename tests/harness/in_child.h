@@ -1,15 +1,8 @@
 // Checks in a process of their own: what they register, no other test sees.
 #pragma once
 
-#include <gtest/gtest.h>
-
-#include <cstdlib>
-#include <iostream>
-#include <stdexcept>
-#include <string>
-#include <vector>
-
 #include "harness/cli/program.h"
+#include "tests/standard.h"
 
 namespace loopbench::harness {
 

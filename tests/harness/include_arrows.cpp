@@ -1,9 +1,5 @@
 #include "tests/harness/include_arrows.h"
 
-#include <algorithm>
-#include <initializer_list>
-#include <iterator>
-
 namespace loopbench::architecture {
 namespace {
 

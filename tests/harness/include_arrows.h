@@ -3,9 +3,7 @@
 //   mechanism <- {odca, lagrange, reduction} <- harness <- tests
 #pragma once
 
-#include <string>
-#include <string_view>
-#include <vector>
+#include "tests/standard.h"
 
 namespace loopbench::architecture {
 

@@ -1,16 +1,4 @@
 // Implicit profiles: stability, Newton's iteration and its endings, Jacobians.
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <cmath>
-#include <limits>
-#include <optional>
-#include <span>
-#include <stdexcept>
-#include <string>
-#include <vector>
-
-#include "harness/integrator/arkode.h"
 #include "tests/harness/integrator_problems.h"
 
 namespace loopbench::harness {

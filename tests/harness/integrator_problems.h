@@ -1,17 +1,8 @@
 // Systems with known behaviour for the integrator's tests.
 #pragma once
 
-#include <gtest/gtest.h>
-
-#include <cmath>
-#include <functional>
-#include <span>
-#include <string>
-#include <type_traits>
-#include <utility>
-#include <vector>
-
 #include "harness/integrator/arkode.h"
+#include "tests/standard.h"
 
 namespace loopbench::harness::integrator_test {
 
@@ -84,8 +75,8 @@ StepObserver Watch(Look look) {
 }
 
 /// The options by default but for one.
-template <class T>
-IntegratorOptions With(T IntegratorOptions::*option, std::type_identity_t<T> value) {
+template <class Owner, class T>
+IntegratorOptions With(T Owner::*option, std::type_identity_t<T> value) {
   IntegratorOptions options;
   options.*option = std::move(value);
   return options;

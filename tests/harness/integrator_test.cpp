@@ -1,21 +1,6 @@
 // ARKODE's profiles: order of convergence, step counts, determinism; named endings, observers,
 // restarts; stop times, where the derivative jumps; quadratures, which have no say in the steps.
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <array>
-#include <chrono>
-#include <cmath>
-#include <cstring>
-#include <limits>
-#include <span>
-#include <stdexcept>
-#include <string>
-#include <thread>
-#include <vector>
-
 #include "harness/base/text.h"
-#include "harness/integrator/arkode.h"
 #include "tests/harness/integrator_problems.h"
 
 namespace loopbench::harness::integrator_test {

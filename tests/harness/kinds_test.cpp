@@ -1,13 +1,7 @@
 // Joints and forces that a program adds (mechanism/model/registry.h), and those of
 // examples/own-parts.
-#include <gtest/gtest.h>
-
-#include <regex>
-#include <stdexcept>
-
 #include "examples/own-parts/friction.h"
 #include "examples/own-parts/rack_and_pinion.h"
-#include "harness/base/text.h"
 #include "mechanism/description/library.h"
 #include "mechanism/model/registry.h"
 #include "tests/harness/in_child.h"

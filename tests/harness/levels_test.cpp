@@ -1,10 +1,5 @@
 // Levels of enforcement by name: those that come with Loopbench, and two that a program adds.
-#include <gtest/gtest.h>
-
-#include <filesystem>
-
 #include "examples/own-parts/half_velocity.h"
-#include "harness/base/text.h"
 #include "harness/cli/commands.h"
 #include "harness/figures/figures.h"
 #include "harness/judge/analysis.h"
@@ -14,8 +9,7 @@
 #include "tests/harness/in_child.h"
 #include "tests/reference/cases.h"
 
-namespace loopbench::harness {
-namespace levels_test {
+namespace loopbench::harness::levels_test {
 
 using Names = std::vector<std::string>;
 
@@ -207,5 +201,4 @@ TEST(LevelsTest, RunsInSeveralScalarsKnowTheBuiltInOnes) {
   });
 }
 
-}  // namespace levels_test
-}  // namespace loopbench::harness
+}  // namespace loopbench::harness::levels_test

@@ -1,15 +1,8 @@
 // The table of measures knows every key once, and all keys of a run.
-#include <gtest/gtest.h>
-
-#include <set>
-#include <string_view>
-
 #include "harness/base/record.h"
-#include "harness/run/run.h"
 #include "tests/reference/cases.h"
 
-namespace loopbench::harness {
-namespace measures_test {
+namespace loopbench::harness::measures_test {
 
 TEST(Measures, HaveEachKeyOnceAndATypeWhereTheyAreMore) {
   std::set<std::string_view> keys;
@@ -63,5 +56,4 @@ TEST(Measures, KnowEveryKeyOfARun) {
   for (const auto& [key, value] : record.items()) EXPECT_NE(FindMeasure(key), nullptr) << key;
 }
 
-}  // namespace measures_test
-}  // namespace loopbench::harness
+}  // namespace loopbench::harness::measures_test

@@ -1,21 +1,13 @@
 // What a merge writes, and when it is there.
-#include <fmt/format.h>
-#include <gtest/gtest.h>
 #include <unistd.h>
 
-#include <algorithm>
-#include <functional>
-#include <string>
-#include <vector>
-
 #include "harness/base/record.h"
-#include "harness/base/store.h"
 #include "harness/observers/reference.h"
 #include "tests/harness/cli_fixture.h"
+#include "tests/harness/records.h"
 #include "tests/reference/cases.h"
 
-namespace loopbench::harness {
-namespace merge_test {
+namespace loopbench::harness::merge_test {
 
 class MergeCommandTest : public CommandLineTest {
  protected:
@@ -49,12 +41,13 @@ class MergeCommandTest : public CommandLineTest {
 
 TEST_F(MergeCommandTest, TrajectoriesAreThoseOfTheRecordsThatAreKept) {
   Write("two.json", std::string(kTinyExperiment).insert(1, R"("output": {"number": 3},)"));
-  ExpectEnding(Call("run two.json --out whole"), 0, {"ran 2 cases"});
+  Expect("run two.json --out whole", 0, {"ran 2 cases"});
   CopyStore("whole", "cut",
             [](Record* record) { record->Set("outcome", std::string("time-limit")); });
-  for (const fs::path& file : Files("cut/trajectories")) WriteFileAtomically(file, "t [s]\n0\n");
-  ExpectEnding(Call("merge cut whole --out m1"), 0, {": 2 cases"});
-  ExpectEnding(Call("merge whole cut --out m2"), 0, {": 2 cases"});
+  for (const fs::path& file : Files("cut/trajectories"))
+    WriteFileAtomically(file, "t [s]\n0\n", Onto::kAnyFile);
+  Expect("merge cut whole --out m1", 0, {": 2 cases"});
+  Expect("merge whole cut --out m2", 0, {": 2 cases"});
   ExpectTrajectories("m1", "whole");
   ExpectTrajectories("m2", "whole");
 
@@ -64,17 +57,17 @@ TEST_F(MergeCommandTest, TrajectoriesAreThoseOfTheRecordsThatAreKept) {
   for (const std::string order : {"whole bare --out m3", "bare whole --out m4"}) {
     const Ending merged = Call("merge " + order);
     ExpectEnding(merged, 0, {": 2 cases"});
-    EXPECT_EQ(merged.text.find("warning"), std::string::npos) << merged.text;
+    ExpectNone(merged.text, {"warning"});
     ExpectTrajectories(order.substr(order.size() - 2), "whole");
   }
   // and another run's is none
-  ExpectEnding(Call("merge cut bare --out m5"), 0,
-               {"no store has trajectories/", "as the run that is kept wrote it"});
+  Expect("merge cut bare --out m5", 0,
+         {"no store has trajectories/", "as the run that is kept wrote it"});
   EXPECT_FALSE(fs::exists(folder_ / "m5/trajectories"));
 }
 
 TEST_F(MergeCommandTest, OneThatFailsLeavesNothing) {
-  ExpectEnding(Call("run tiny.json --out a"), 0, {});
+  Expect("run tiny.json --out a", 0);
   ExpectEnding(Call("merge a --out deep/m", "ulimit -f 1;"), 2, {"File too large"});
   EXPECT_FALSE(fs::exists(folder_ / "deep"));
   fs::create_directory(folder_ / "m");
@@ -82,32 +75,31 @@ TEST_F(MergeCommandTest, OneThatFailsLeavesNothing) {
   EXPECT_TRUE(Files("m").empty());
   // what one that was killed left
   Write("m/results.jsonl.merging", "{\"kind\":");
-  ExpectEnding(Call("merge a --out m"), 0, {": 2 cases"});
+  Expect("merge a --out m", 0, {": 2 cases"});
   EXPECT_EQ(Files("m").size(), 1u);
   EXPECT_EQ(ReadRecords(folder_ / "m").size(), 2u);
 }
 
 TEST_F(MergeCommandTest, OneAtATime) {
-  ExpectEnding(Call("run tiny.json --out a"), 0, {});
+  Expect("run tiny.json --out a", 0);
   fs::create_directory(folder_ / "m");
   const int other = OpenLocked(folder_ / "m/results.jsonl.merging");
-  ExpectEnding(Call("merge a --out m"), 2,
-               {"m/results.jsonl.merging", "in use by process " + std::to_string(::getpid())});
+  Expect("merge a --out m", 2,
+         {"m/results.jsonl.merging", "in use by process " + std::to_string(::getpid())});
   EXPECT_FALSE(fs::exists(folder_ / "m/results.jsonl"));
   ::close(other);
   {
     const ResultStore run(folder_ / "m");  // that has no record yet
-    ExpectEnding(Call("merge a --out m"), 2, {"m/results.jsonl'", "in use by process "});
+    Expect("merge a --out m", 2, {"m/results.jsonl'", "in use by process "});
   }
-  ExpectEnding(Call("merge a --out m"), 0, {": 2 cases"});
+  Expect("merge a --out m", 0, {": 2 cases"});
 }
 
 TEST_F(MergeCommandTest, TheTargetIsLookedAtBeforeTheStores) {
-  ExpectEnding(Call("run tiny.json --out a"), 0, {});
+  Expect("run tiny.json --out a", 0);
   Write("bad.jsonl", "no record\n");
-  ExpectEnding(Call("merge bad.jsonl --out a"), 2,
-               {"a/results.jsonl: found records, expected a new"});
-  ExpectEnding(Call("merge bad.jsonl --out m"), 2, {"bad.jsonl:1:"});
+  Expect("merge bad.jsonl --out a", 2, {"a/results.jsonl: found records, expected a new"});
+  Expect("merge bad.jsonl --out m", 2, {"bad.jsonl:1:"});
   EXPECT_FALSE(fs::exists(folder_ / "m"));
 }
 
@@ -116,11 +108,8 @@ TEST_F(MergeCommandTest, WhatVariesStandsInTheTableOfMeasures) {
   const auto refusal_of = [this](std::string_view key) -> std::string {
     std::vector<fs::path> stores;
     for (const char* value : {"1", "2"}) {
-      Record record;
-      record.Set("kind", std::string("accuracy"));
-      record.Set("id", std::string("0123456789abcdef"));
-      record.Set("outcome", std::string("finished"));
-      record.Set(std::string(key), std::string(value));
+      Record record = RecordOf("kind", "accuracy", "id", "0123456789abcdef", "outcome", "finished",
+                               std::string(key), value);
       stores.push_back(folder_ / fmt::format("{}-{}.jsonl", key, value));
       WriteFileAtomically(stores.back(), ToJsonLine(record) + '\n');
     }
@@ -142,32 +131,30 @@ TEST_F(MergeCommandTest, WhatVariesStandsInTheTableOfMeasures) {
     varying += varies;
   }
   EXPECT_GT(varying, 3);
-  EXPECT_NE(refusal_of("of_another_program").find("has of_another_program 1 in the first"),
-            std::string::npos);
+  ExpectWords(refusal_of("of_another_program"), {"has of_another_program 1 in the first"});
 }
 
 TEST_F(MergeCommandTest, ALinkStaysOne) {
-  ExpectEnding(Call("run tiny.json --out a"), 0, {});
+  Expect("run tiny.json --out a", 0);
   fs::create_directories(folder_ / "far/away");
   fs::create_symlink("far/away/m.jsonl", folder_ / "m.jsonl");
-  ExpectEnding(Call("merge a --out m.jsonl"), 0, {": 2 cases"});
+  Expect("merge a --out m.jsonl", 0, {": 2 cases"});
   EXPECT_TRUE(fs::is_symlink(folder_ / "m.jsonl"));
   EXPECT_EQ(ReadRecords(folder_ / "far/away/m.jsonl").size(), 2u);
 }
 
 TEST_F(MergeCommandTest, ALinkThatLeadsNowhereIsNamed) {
-  ExpectEnding(Call("run tiny.json --out a"), 0, {});
+  Expect("run tiny.json --out a", 0);
   fs::create_symlink("nowhere/m.jsonl", folder_ / "m.jsonl");
-  ExpectEnding(Call("merge a --out m.jsonl"), 2,
-               {"m.jsonl: found a symbolic link to nowhere/m.jsonl, whose folder is not there"});
+  Expect("merge a --out m.jsonl", 2,
+         {"m.jsonl: found a symbolic link to nowhere/m.jsonl, whose folder is not there"});
   fs::create_symlink("nowhere", folder_ / "m");
-  ExpectEnding(Call("merge a --out m"), 2,
-               {"cannot make folder 'm': 'm' is a symbolic link to 'nowhere', which is not there"});
-  ExpectEnding(Call("merge a --out m/below"), 2, {"'m' is a symbolic link to 'nowhere'"});
+  Expect("merge a --out m", 2,
+         {"cannot make folder 'm': 'm' is a symbolic link to 'nowhere', which is not there"});
+  Expect("merge a --out m/below", 2, {"'m' is a symbolic link to 'nowhere'"});
   fs::create_symlink("one.jsonl", folder_ / "two.jsonl");
   fs::create_symlink("two.jsonl", folder_ / "one.jsonl");
-  ExpectEnding(Call("merge a --out one.jsonl"), 2,
-               {"one.jsonl: found a symbolic link in a circle of them"});
+  Expect("merge a --out one.jsonl", 2, {"one.jsonl: found a symbolic link in a circle of them"});
   EXPECT_TRUE(fs::is_symlink(folder_ / "one.jsonl"));
 }
 
@@ -195,8 +182,8 @@ class MergeReferencesTest : public CommandLineTest {
  protected:
   void SetUp() override {
     CommandLineTest::SetUp();
-    ExpectEnding(Call("run tiny.json --no-timing --shard 1/2 --out a"), 0, {});
-    ExpectEnding(Call("run tiny.json --no-timing --shard 2/2 --out b"), 0, {});
+    Expect("run tiny.json --no-timing --shard 1/2 --out a", 0);
+    Expect("run tiny.json --no-timing --shard 2/2 --out b", 0);
   }
   fs::path File(const std::string& store, const std::string& id) const {
     return ReferencePath(folder_ / store / "results.jsonl", id);
@@ -213,7 +200,7 @@ TEST_F(MergeReferencesTest, AreThoseOfAllStores) {
   Certify("b", "0000000000000003", Certificate(1e-14, 0.0));
   const Ending merged = Call("merge a b --out m");
   ExpectEnding(merged, 0, {"3 references beside it"});
-  EXPECT_EQ(merged.text.find("is kept"), std::string::npos) << merged.text;
+  ExpectNone(merged.text, {"is kept"});
   for (const auto& [store, id] :
        {std::pair("a", "0000000000000001"), {"a", "0000000000000002"}, {"b", "0000000000000003"}}) {
     EXPECT_EQ(ReadFile(File("m", id)), ReadFile(File(store, id))) << id;
@@ -242,15 +229,14 @@ TEST_F(MergeReferencesTest, AreRefusedDamagedOrUnderAnotherNameBeforeAnythingIsW
   const std::string sound = ReadFile(File("b", id));
   std::string changed = sound;
   changed.replace(changed.find("long-double"), 4, "shor");
-  WriteFileAtomically(File("b", id), changed);
-  ExpectEnding(Call("merge a b --out m"), 2, {"0000000000000001.json", "checksum"});
+  WriteFileAtomically(File("b", id), changed, Onto::kAnyFile);
+  Expect("merge a b --out m", 2, {"0000000000000001.json", "checksum"});
   EXPECT_FALSE(fs::exists(folder_ / "m"));
-  WriteFileAtomically(File("b", id), sound);
+  WriteFileAtomically(File("b", id), sound, Onto::kAnyFile);
   fs::rename(File("b", id), File("b", "0000000000000002"));
-  ExpectEnding(Call("merge a b --out m"), 2,
-               {"found reference \"0000000000000001\", expected \"0000000000000002\""});
+  Expect("merge a b --out m", 2,
+         {"found reference \"0000000000000001\", expected \"0000000000000002\""});
   EXPECT_FALSE(fs::exists(folder_ / "m"));
 }
 
-}  // namespace merge_test
-}  // namespace loopbench::harness
+}  // namespace loopbench::harness::merge_test

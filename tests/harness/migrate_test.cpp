@@ -3,16 +3,12 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include <fstream>
-#include <regex>
-
 #include "harness/base/record.h"
-#include "harness/base/store.h"
 #include "harness/suite/suite.h"
 #include "tests/harness/cli_fixture.h"
+#include "tests/harness/records.h"
 
-namespace loopbench::harness {
-namespace migrate_test {
+namespace loopbench::harness::migrate_test {
 
 /// Returns the text with the old or the new name of each "<old|new>".
 std::string WithNames(const std::string& text, bool is_new) {
@@ -74,23 +70,12 @@ class MigrateTest : public CommandLineTest {
   }
 
   static Record OldRecord(const std::string& formulation) {
-    Record record;
-    record.Set("kind", std::string("accuracy"));
-    record.Set("mechanism", std::string("four-bar"));
-    record.Set("formulation", formulation);
-    record.Set("enforcement", std::string("position"));
-    record.Set("solver", std::string("as-published"));
-    record.Set("rtol", 1e-6);
-    record.Set("horizon", 1.0);
-    record.Set("content", std::string("c0"));
-    record.Set("outcome", std::string("finished"));
-    record.Set("scene_id", std::string("00ff"));
-    record.Set("doubts", std::string("energy softened singular-passage"));
-    record.Set("softened_evaluations", std::int64_t{3});
-    record.Set("trust_horizon", 1.0);
-    record.Set("drift_position_max", 1.25e-7);
-    record.Set("message", std::string("at the position \"softened_steps\": \\ \""));
-    return record;
+    return RecordOf("kind", "accuracy", "mechanism", "four-bar", "formulation", formulation,
+                    "enforcement", "position", "solver", "as-published", "rtol", 1e-6, "horizon",
+                    1.0, "content", "c0", "outcome", "finished", "scene_id", "00ff", "doubts",
+                    "energy softened singular-passage", "softened_evaluations", 3, "trust_horizon",
+                    1.0, "drift_position_max", 1.25e-7, "message",
+                    "at the position \"softened_steps\": \\ \"");
   }
 
   /// The line of a record as earlier versions wrote it.
@@ -110,10 +95,10 @@ class MigrateTest : public CommandLineTest {
 TEST_F(MigrateTest, AnOldExperimentIsReadAfterwards) {
   EXPECT_EQ(Migrated("old-bar.json", OldMechanism()), mechanism_);
   Write("old.json", WithNames(kExperiment, false));
-  ExpectEnding(Call("run old.json"), 2, {"unknown key \"scenes\"", "loopbench migrate FILE"});
+  Expect("run old.json", 2, {"unknown key \"scenes\"", "loopbench migrate FILE"});
   ExpectNewNames("old.json", kExperiment);
-  ExpectEnding(Call("check old.json old-bar.json"), 0, {"old.json: experiment"});
-  ExpectEnding(Call("migrate old.json old-bar.json tiny.json"), 0, {"tiny.json: no old names"});
+  Expect("check old.json old-bar.json", 0, {"old.json: experiment"});
+  Expect("migrate old.json old-bar.json tiny.json", 0, {"tiny.json: no old names"});
 }
 
 TEST_F(MigrateTest, OldRulesAreReadAfterwards) {
@@ -121,16 +106,15 @@ TEST_F(MigrateTest, OldRulesAreReadAfterwards) {
   std::string claims = kTinyClaims;
   claims.replace(claims.find("partially_reproduced"), 20, "only_under");
   EXPECT_EQ(Migrated("claims.json", claims), kTinyClaims);
-  ExpectEnding(Call("check map.json claims.json"), 0, {"robustness map of 1 row and 1 method"});
+  Expect("check map.json claims.json", 0, {"robustness map of 1 row and 1 method"});
 }
 
 TEST_F(MigrateTest, AnOldStoreIsReadAfterwards) {
   WriteStore(OldLine(OldRecord("odca")) + "\n" + OldLine(OldRecord("lagrange")) + "\n");
   const fs::path file = folder_ / "out/results.jsonl";
   // read as it is, its warnings and crossings would be missing
-  ExpectEnding(Call("table out --fail-on warnings"), 2,
-               {"expected 2", "found 1", "loopbench migrate"});
-  ExpectEnding(Call("migrate out"), 0, {"out/results.jsonl: 18 names replaced"});
+  Expect("table out --fail-on warnings", 2, {"expected 2", "found 1", "loopbench migrate"});
+  Expect("migrate out", 0, {"out/results.jsonl: 18 names replaced"});
   const std::string text = ReadFile(file);
   for (std::size_t begin = 0, end; (end = text.find('\n', begin)) != text.npos; begin = end + 1) {
     EXPECT_TRUE(VerifyChecksum(std::string_view(text).substr(begin, end - begin)));
@@ -146,15 +130,15 @@ TEST_F(MigrateTest, AnOldStoreIsReadAfterwards) {
   EXPECT_EQ(records[1].Number("reference_valid_until"), 1.0);
   EXPECT_EQ(records[1].Number("drift_position_max"), 1.25e-7);
   EXPECT_EQ(records[1].Text("message"), OldRecord("odca").Text("message"));
-  ExpectEnding(Call("table out"), 0, {"proj", "plain"});
-  ExpectEnding(Call("migrate out"), 0, {"out/results.jsonl: no old names"});
+  Expect("table out", 0, {"proj", "plain"});
+  Expect("migrate out", 0, {"out/results.jsonl: no old names"});
   EXPECT_EQ(ReadFile(file), text);
 }
 
 TEST_F(MigrateTest, LineEndsAndTornLinesStay) {
   const std::string torn = R"({"format":1,"kind":"accuracy","doubts":"ene)";
   WriteStore(OldLine(OldRecord("odca")) + "\r\n\r\n" + torn);
-  ExpectEnding(Call("migrate out"), 0, {"9 names replaced"});
+  Expect("migrate out", 0, {"9 names replaced"});
   const std::string text = ReadFile(folder_ / "out/results.jsonl");
   const std::size_t end = text.find('\r');
   EXPECT_TRUE(VerifyChecksum(std::string_view(text).substr(0, end)));
@@ -168,7 +152,7 @@ TEST_F(MigrateTest, MechanismsOfAStoreKeepTheirChecksum) {
   mechanism.insert(mechanism.find("\"comment\": \"") + 12,
                    "Kept by a run; checksum 0000000000000000. ");
   Write("out/mechanisms/00ff.json", WithOwnHash(mechanism));
-  ExpectEnding(Call("migrate out"), 0, {"00ff.json: 1 names replaced"});
+  Expect("migrate out", 0, {"00ff.json: 1 names replaced"});
   EXPECT_EQ(ReadKeptMechanism(folder_ / "out/mechanisms/00ff.json").name, "four-bar");
 }
 
@@ -206,20 +190,19 @@ TEST_F(MigrateTest, OtherFilesAreRefusedAsTheyAre) {
       {"text.jsonl", "scene_id\nscene_id\n"}};
   for (const auto& [name, text] : files) {
     Write(name, text);
-    ExpectEnding(Call(std::string("migrate tiny.json ") + name), 2, {name, "tiny.json: no old"});
+    Expect(std::string("migrate tiny.json ") + name, 2, {name, "tiny.json: no old"});
     EXPECT_EQ(ReadFile(folder_ / name), text);
   }
   for (const char* name : {"none.json", "/dev/null", "pipe.json"}) {
     if (std::string_view(name) == "pipe.json") {
       ASSERT_EQ(::mkfifo((folder_ / name).c_str(), 0600), 0);
     }
-    ExpectEnding(Call(std::string("migrate ") + name), 2, {name, "expected a regular file"});
+    Expect(std::string("migrate ") + name, 2, {name, "expected a regular file"});
   }
   WriteStore(OldLine(OldRecord("odca")) + "\n");
   const int lock = OpenLocked(folder_ / "out/results.jsonl");
-  ExpectEnding(Call("migrate out"), 2, {"results.jsonl", "process"});
+  Expect("migrate out", 2, {"results.jsonl", "process"});
   ::close(lock);
 }
 
-}  // namespace migrate_test
-}  // namespace loopbench::harness
+}  // namespace loopbench::harness::migrate_test

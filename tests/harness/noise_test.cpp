@@ -1,17 +1,10 @@
 // When the machine counts as noisy: planted numbers on either side of each threshold.
-#include <gtest/gtest.h>
-
-#include <cmath>
-#include <limits>
-#include <string>
-#include <vector>
-
 #include "harness/base/record.h"
 #include "harness/config/experiment_reader.h"
 #include "harness/run/timing.h"
+#include "tests/standard.h"
 
-namespace loopbench::harness {
-namespace noise_test {
+namespace loopbench::harness::noise_test {
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
@@ -135,5 +128,4 @@ TEST(TimeTogether, RecordsHoldOrderedStatisticsAndTheAaPair) {
   }
 }
 
-}  // namespace noise_test
-}  // namespace loopbench::harness
+}  // namespace loopbench::harness::noise_test

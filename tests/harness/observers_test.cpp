@@ -1,19 +1,10 @@
 // An observer that a program adds, and the keys that it writes.
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <filesystem>
-#include <string>
-
-#include "harness/base/text.h"
 #include "harness/judge/judge.h"
 #include "harness/observers/registry.h"
-#include "harness/run/run.h"
 #include "tests/harness/in_child.h"
 #include "tests/reference/cases.h"
 
-namespace loopbench::harness {
-namespace observers_test {
+namespace loopbench::harness::observers_test {
 
 /// The largest speed, when, and how many states were seen.
 template <class Space>
@@ -168,5 +159,4 @@ TEST(ObserversTest, EachNameAndKeyOnce) {
   });
 }
 
-}  // namespace observers_test
-}  // namespace loopbench::harness
+}  // namespace loopbench::harness::observers_test

@@ -1,12 +1,7 @@
 // Texts for users do not contain these earlier names, most of which `loopbench migrate` replaces.
-#include <array>
-#include <regex>
-#include <string_view>
-
 #include "tests/harness/cli_fixture.h"
 
-namespace loopbench::harness {
-namespace old_names_test {
+namespace loopbench::harness::old_names_test {
 
 constexpr std::array<std::string_view, 45> kOldNames = {
     "as-published",   "trust_horizon",     "scene_id",
@@ -95,5 +90,4 @@ TEST_F(OldNamesOfCommands, OptionsInDocumentsExist) {
   EXPECT_GT(options, 200);
 }
 
-}  // namespace old_names_test
-}  // namespace loopbench::harness
+}  // namespace loopbench::harness::old_names_test

@@ -1,11 +1,8 @@
 // Kinds of forces that a program would add, and that no file could say.
-#include <gtest/gtest.h>
-
 #include "mechanism/model/registry.h"
 #include "tests/harness/in_child.h"
 
-namespace loopbench::harness {
-namespace other_forces_test {
+namespace loopbench::harness::other_forces_test {
 
 /// Parts as a kind may have them, of which a change makes parts that no file could say.
 struct Odd {
@@ -42,5 +39,4 @@ TEST(OtherForces, ThatNoFileCouldSayAreRefused) {
              "without key or value");
 }
 
-}  // namespace other_forces_test
-}  // namespace loopbench::harness
+}  // namespace loopbench::harness::other_forces_test

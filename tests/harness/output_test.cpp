@@ -1,22 +1,15 @@
 // Where output goes: into devices and pipes, through links, never onto an input; and that a signal
 // leaves no temporary file.
 #include <fcntl.h>
-#include <fmt/format.h>
 #include <sys/file.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include <csignal>
-#include <fstream>
-#include <set>
-#include <thread>
-
 #include "tests/harness/cli_fixture.h"
 
-namespace loopbench::harness {
-namespace output_test {
+namespace loopbench::harness::output_test {
 
 class OutputFiles : public CommandLineTest {
  protected:
@@ -143,12 +136,17 @@ TEST_F(OutputFiles, OfEveryCommandGoesTheSameWay) {
       R"({"benchmarks": [{"name": "rhs/chain/3/odca/acceleration/joint/rank-revealing", "cpu_time": 1, "real_time": 1},
     {"name": "rhs/chain/30/odca/acceleration/joint/rank-revealing", "cpu_time": 10, "real_time": 10}]})");
   const std::string store = "store/results.jsonl";
+  const std::vector<std::string> kept = {
+      "store/trajectories/" + NamesIn(At("store/trajectories")).front(),
+      "store/mechanisms/" + NamesIn(At("store/mechanisms")).front()};
   // commands that write one file, each with its output last, and the inputs that it must not be
   for (const auto& [command, inputs] : std::map<std::string, std::vector<std::string>>{
            {"table store --format csv --out ", {store}},
            {"view four-bar.json --format html --out ", {"four-bar.json"}},
            {"view four-bar.json --format svg --out ", {"four-bar.json"}},
            {"export-metrics store --out ", {store}},
+           {"report store --out ", {store}},
+           {"count four-bar.json --out ", {"four-bar.json"}},
            {"fit-scaling b.json --out ", {"b.json"}},
            {"export-mechanism four-bar.json --to mjcf --out ", {"four-bar.json"}},
            {"compare store copy --markdown ", {store, "copy/results.jsonl"}},
@@ -176,6 +174,15 @@ TEST_F(OutputFiles, OfEveryCommandGoesTheSameWay) {
       }
       fs::remove(At("there"));
       EXPECT_EQ(ReadFile(At(input)), before) << input;
+    }
+    for (const std::string& file : kept) {
+      const std::string before = ReadFile(At(file));
+      fs::create_symlink(file, At("there"));
+      for (const std::string& path : {file, std::string("there")}) {
+        Expect(command + path, 2, {"cannot write '" + path + "': found a"});
+      }
+      fs::remove(At("there"));
+      EXPECT_EQ(ReadFile(At(file)), before) << file;
     }
   }
 }
@@ -320,5 +327,4 @@ TEST(Files, ANewFileLeavesNothingBesideIt) {
   }
 }
 
-}  // namespace output_test
-}  // namespace loopbench::harness
+}  // namespace loopbench::harness::output_test

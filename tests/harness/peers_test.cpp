@@ -1,14 +1,9 @@
 // Peers in a build that has none: their names are known, files are read, runs are refused.
-#include <gtest/gtest.h>
-
-#include "harness/base/text.h"
-#include "harness/run/run.h"
 #include "tests/harness/cli_fixture.h"
 #include "tests/harness/in_child.h"
 #include "tests/reference/cases.h"
 
-namespace loopbench::harness {
-namespace peers_test {
+namespace loopbench::harness::peers_test {
 
 constexpr const char* kMessage =
     "formulation \"peer/simbody\" needs a build with -DLOOPBENCH_PEERS=ON";
@@ -81,14 +76,13 @@ TEST(PeersTest, ARegisteredOneIsMade) {
 #ifndef LOOPBENCH_PEERS
 TEST_F(CommandLineTest, PeersAreReadInEveryBuildAndRunWhereTheyAre) {
   Write("peers.json", Asking());
-  ExpectEnding(Call("check peers.json"), 0, {"2 cases"});
-  ExpectEnding(Call("list peers.json"), 0, {"peer/simbody"});
-  ExpectEnding(Call("explain peers.json"), 0, {"peer/simbody: the library Simbody"});
-  ExpectEnding(Call("run peers.json --out out"), 2, {"peers.json: /methods: ", kMessage});
+  Expect("check peers.json", 0, {"2 cases"});
+  Expect("list peers.json", 0, {"peer/simbody"});
+  Expect("explain peers.json", 0, {"peer/simbody: the library Simbody"});
+  Expect("run peers.json --out out", 2, {"peers.json: /methods: ", kMessage});
   EXPECT_FALSE(fs::exists(folder_ / "out"));
-  ExpectEnding(Call("estimate peers.json"), 2, {kMessage});
+  Expect("estimate peers.json", 2, {kMessage});
 }
 #endif
 
-}  // namespace peers_test
-}  // namespace loopbench::harness
+}  // namespace loopbench::harness::peers_test

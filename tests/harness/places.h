@@ -2,14 +2,9 @@
 // messages.
 #pragma once
 
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <filesystem>
-#include <string>
-#include <vector>
-
 #include "harness/base/text.h"
+#include "harness/config/mechanism_reader.h"
+#include "tests/standard.h"
 
 namespace loopbench::harness {
 
@@ -24,6 +19,23 @@ inline std::vector<std::filesystem::path> JsonFilesIn(const std::filesystem::pat
   }
   std::ranges::sort(files);
   return files;
+}
+
+/// The text of a file of tests/data.
+inline std::string TestData(const std::string& name) {
+  return ReadFile(kRoot / "tests/data" / name);
+}
+
+/// A mechanism of configs/mechanisms/.
+inline MechanismFile Shipped(const std::string& name) {
+  return ReadMechanism(kConfigs / "mechanisms" / (name + ".json"));
+}
+
+/// Names of the shipped mechanisms, sorted.
+inline std::vector<std::string> ShippedNames() {
+  std::vector<std::string> names;
+  for (const auto& file : JsonFilesIn(kConfigs / "mechanisms")) names.push_back(file.stem());
+  return names;
 }
 
 /// The message of the Error that `call` throws, "" if none. Other errors pass through.

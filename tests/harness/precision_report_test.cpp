@@ -1,38 +1,20 @@
 // Order, notes and figures of runs in several scalars.
-#include <gtest/gtest.h>
-
-#include <cmath>
-#include <string>
-#include <vector>
-
 #include "harness/figures/figures.h"
 #include "harness/judge/tables.h"
+#include "tests/harness/records.h"
+#include "tests/standard.h"
 
-namespace loopbench::harness {
-namespace precision_report_test {
+namespace loopbench::harness::precision_report_test {
 
 Record SweepLevel(const std::string& scalar, double rtol, const std::string& outcome = "finished") {
-  Record record;
-  record.Set("kind", std::string("precision"));
-  record.Set("mechanism", std::string("four-bar"));
-  record.Set("formulation", std::string("odca"));
-  record.Set("enforcement", std::string("velocity"));
-  record.Set("coordinates", std::string("joint"));
-  record.Set("solver", std::string("rank-revealing"));
-  record.Set("integrator", std::string("ode45"));
-  record.Set("rtol", rtol);
-  record.Set("horizon", 5.0);
-  record.Set("scalar", scalar);
-  record.Set("outcome", outcome);
-  record.Set("error_final", 10 * rtol);
-  record.Set("drift_position_max", rtol);
-  return record;
+  return RecordOf("kind", "precision", "mechanism", "four-bar", "formulation", "odca",
+                  "enforcement", "velocity", "coordinates", "joint", "solver", "rank-revealing",
+                  "integrator", "ode45", "rtol", rtol, "horizon", 5.0, "scalar", scalar, "outcome",
+                  outcome, "error_final", 10 * rtol, "drift_position_max", rtol);
 }
 
 std::vector<Record> Ladder() {
-  Record reference = SweepLevel("float128", 1e-25);
-  reference.Set("integrator", std::string("gragg"));
-  return {reference,
+  return {Changed(SweepLevel("float128", 1e-25), "integrator", "gragg"),
           SweepLevel("float", 1e-4),
           SweepLevel("float", 1e-8, "step-too-small"),
           SweepLevel("float128", 1e-4),
@@ -77,5 +59,4 @@ TEST(PrecisionReportTest, OneFigurePerLadderWithErrorAndDriftOfEachScalar) {
   EXPECT_TRUE(PrecisionFigures({}).empty());
 }
 
-}  // namespace precision_report_test
-}  // namespace loopbench::harness
+}  // namespace loopbench::harness::precision_report_test

@@ -1,18 +1,13 @@
 // Work in child processes: each way to end has its name, and the others go on.
 #include "harness/run/processes.h"
 
-#include <gtest/gtest.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include <csignal>
-#include <map>
-#include <thread>
-
 #include "harness/base/text.h"
+#include "tests/standard.h"
 
-namespace loopbench::harness {
-namespace processes_test {
+namespace loopbench::harness::processes_test {
 
 using Results = std::map<std::size_t, ProcessResult>;
 
@@ -256,5 +251,4 @@ TEST(SharedProcessesTest, WhatEndsAProcessEndsOneTaskOnly) {
   EXPECT_EQ(results.at(100).text, "no");
 }
 
-}  // namespace processes_test
-}  // namespace loopbench::harness
+}  // namespace loopbench::harness::processes_test

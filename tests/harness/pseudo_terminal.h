@@ -7,9 +7,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include <chrono>
-#include <functional>
-#include <string>
+#include "tests/standard.h"
 
 namespace loopbench::harness {
 

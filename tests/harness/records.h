@@ -1,11 +1,6 @@
 // Records, and expected texts, written briefly.
 #pragma once
 
-#include <gtest/gtest.h>
-
-#include <string>
-#include <utility>
-
 #include "harness/base/record.h"
 #include "harness/judge/tables.h"
 #include "tests/harness/places.h"

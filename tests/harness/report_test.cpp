@@ -281,7 +281,7 @@ TEST_F(ReportCommand, MotionsComeFromTheStore) {
     Expect("view " + entry.path().string() + " --out kept.html", 0);
   }
   for (const auto& entry : fs::directory_iterator(folder_ / "out/trajectories")) {
-    WriteFileAtomically(entry.path(), "no trajectory\n");
+    WriteFileAtomically(entry.path(), "no trajectory\n", Onto::kAnyFile);
   }
   const Ending damaged = Call("report out --out damaged.html");
   EXPECT_EQ(damaged.code, 2) << damaged.text;
@@ -300,7 +300,7 @@ TEST_F(ReportCommand, FilesBesideTheStoreAreVerified) {
     std::string text = ReadFile(file);
     const std::size_t at = text.rfind(from);
     ASSERT_NE(at, std::string::npos) << from;
-    WriteFileAtomically(file, text.replace(at, from.size(), to));
+    WriteFileAtomically(file, text.replace(at, from.size(), to), Onto::kAnyFile);
   };
   const fs::path trajectory = only("trajectories"), mechanism = only("mechanisms");
   const std::string sound = ReadFile(trajectory), whole = ReadFile(mechanism);
@@ -313,11 +313,11 @@ TEST_F(ReportCommand, FilesBesideTheStoreAreVerified) {
   const Ending moved = Call("report out --out page.html");
   if (moved.text.find("built without") != std::string::npos) GTEST_SKIP() << moved.text;
   ExpectEnding(moved, 2, {"wrote page.html", "the file was changed"});
-  WriteFileAtomically(trajectory, sound);
+  WriteFileAtomically(trajectory, sound, Onto::kAnyFile);
   Expect("report out --out page.html", 0);
   change(mechanism, "1.5", "1.7");
   Expect("report out --out page.html", 2, {"mechanisms/", "the file was changed"});
-  WriteFileAtomically(mechanism, whole);
+  WriteFileAtomically(mechanism, whole, Onto::kAnyFile);
   Expect("report out --out page.html", 0);
 }
 

@@ -5,17 +5,10 @@
 #include <sys/resource.h>
 #include <unistd.h>
 
-#include <chrono>
-#include <csignal>
-#include <map>
-#include <random>
-#include <sstream>
-#include <thread>
-
 #include "tests/harness/cli_fixture.h"
+#include "tests/harness/records.h"
 
-namespace loopbench::harness {
-namespace resume_test {
+namespace loopbench::harness::resume_test {
 
 using Seconds = std::chrono::duration<double>;
 
@@ -62,7 +55,7 @@ class Interruption : public CommandLineTest {
 TEST_F(Interruption, OfAThousandCasesTwentyTimesChangesNoDigit) {
   Write("sweep.json", Sweep(250));
   const auto begin = std::chrono::steady_clock::now();
-  ExpectEnding(Call("run sweep.json --out whole --jobs 2"), 0, {"ran 1000 cases"});
+  Expect("run sweep.json --out whole --jobs 2", 0, {"ran 1000 cases"});
   const double whole_s = Seconds(std::chrono::steady_clock::now() - begin).count();
   std::mt19937 random(1);
   std::uniform_real_distribution<double> moment(0.0, whole_s / 15);
@@ -96,10 +89,8 @@ TEST_F(Interruption, OfTheStoreLosesNoRecordThatWasAcknowledged) {
     if (pid == 0) {
       ResultStore writer(store);
       for (std::int64_t n = 0;; ++n) {
-        Record record;
-        record.Set("kind", std::string("test"));
-        record.Set("n", n);
-        record.Set("series", std::vector<double>(500, 1.0 / 3.0));
+        Record record =
+            RecordOf("kind", "test", "n", n, "series", std::vector<double>(500, 1.0 / 3.0));
         writer.Append(record);
         if (::write(ends[1], "x", 1) != 1) ::_exit(1);
       }
@@ -134,11 +125,11 @@ TEST_F(Interruption, SecondRunOnAStoreIsRefusedAndNamesTheFirst) {
   Write("sweep.json", Sweep(250));
   const pid_t pid = Start({"run", "sweep.json", "--out", "out"});
   while (!fs::exists(folder_ / "out/results.jsonl")) std::this_thread::yield();
-  ExpectEnding(Call("run sweep.json --out out"), 2,
-               {"out/results.jsonl' is in use by process " + std::to_string(pid)});
+  Expect("run sweep.json --out out", 2,
+         {"out/results.jsonl' is in use by process " + std::to_string(pid)});
   ::kill(pid, SIGKILL);
   ::waitpid(pid, nullptr, 0);
-  ExpectEnding(Call("run tiny.json --out out"), 0, {"ran 2 cases"});
+  Expect("run tiny.json --out out", 0, {"ran 2 cases"});
 }
 
 /// State hashes by case.
@@ -154,7 +145,7 @@ TEST_F(Interruption, FaultsOfOneCaseAreItsOutcomeAndHarmNoOther) {
   std::string text = kTinyExperiment;
   text.replace(text.find("\"timing\""), 8, R"("limits": {"wall_s": 0.2}, "timing")");
   Write("tiny.json", text);
-  ExpectEnding(Call("run tiny.json --out clean"), 0, {});
+  Expect("run tiny.json --out clean", 0);
   const std::map<std::string, std::string> outcomes = {{"crash", "crashed"},
                                                        {"throw", "crashed"},
                                                        {"hang", "process-time-limit"},
@@ -172,9 +163,8 @@ TEST_F(Interruption, FaultsOfOneCaseAreItsOutcomeAndHarmNoOther) {
     int differ = 0;
     for (const auto& [id, hash] : Hashes(folder_ / out)) differ += hash != clean.at(id);
     EXPECT_EQ(differ, 1) << fault;
-    ExpectEnding(Call("run tiny.json --out " + out), 0, {"ran 0 cases, 2 reused"});
-    ExpectEnding(Call("run tiny.json --out " + out + " --rerun failed"), 0,
-                 {"ran 1 case, 1 reused"});
+    Expect("run tiny.json --out " + out, 0, {"ran 0 cases, 2 reused"});
+    Expect("run tiny.json --out " + out + " --rerun failed", 0, {"ran 1 case, 1 reused"});
     EXPECT_EQ(Hashes(folder_ / out), clean) << "the last record of a case counts";
     EXPECT_EQ(TableOf(folder_ / out), TableOf(folder_ / "clean"));
   }
@@ -187,7 +177,7 @@ TEST_F(Interruption, ByAFullDiskLeavesCompleteRecordsAndIsSaid) {
     GTEST_SKIP() << "mounting a file system needs root";
   }
   Write("sweep.json", Sweep(250));  // some 2 MB of records
-  ExpectEnding(Call("run sweep.json --out disk/out --jobs 2"), 2, {"No space left on device"});
+  Expect("run sweep.json --out disk/out --jobs 2", 2, {"No space left on device"});
   const std::string text = ReadFile(disk / "out/results.jsonl");
   EXPECT_TRUE(text.ends_with("\n"));
   const std::size_t kept = ReadRecords(disk / "out").size();
@@ -196,7 +186,7 @@ TEST_F(Interruption, ByAFullDiskLeavesCompleteRecordsAndIsSaid) {
   EXPECT_FALSE(fs::exists(disk / "out/drift.csv")) << "no table of part of the cases";
   // the same store goes on where there is room
   fs::copy(disk / "out", folder_ / "moved", fs::copy_options::recursive);
-  ExpectEnding(Call("run sweep.json --out moved --jobs 2"), 0, {std::to_string(kept) + " reused"});
+  Expect("run sweep.json --out moved --jobs 2", 0, {std::to_string(kept) + " reused"});
   ::umount(disk.c_str());
 }
 
@@ -212,7 +202,7 @@ TEST_F(Interruption, AFaultOfTheMachineIsTheOutcomeOfNoCase) {
     ExpectEnding(Call(run, "ulimit -f 200;"), 2, {"cannot write", ".csv", "File too large"});
     EXPECT_EQ(ReadFile(folder_ / "out/results.jsonl"), "");
     EXPECT_TRUE(fs::is_empty(folder_ / "out/trajectories")) << "no part of a trajectory is left";
-    ExpectEnding(Call(run), 0, {"ran 2 cases, 0 reused"});
+    Expect(run, 0, {"ran 2 cases, 0 reused"});
   }
 }
 
@@ -246,43 +236,42 @@ class Shards : public CommandLineTest {};
 
 TEST_F(Shards, TogetherAreTheWhole) {
   Write("sweep.json", Sweep(5));
-  ExpectEnding(Call("run sweep.json --out whole"), 0, {"ran 20 cases"});
+  Expect("run sweep.json --out whole", 0, {"ran 20 cases"});
   std::string parts;
   std::size_t sum = 0;
   for (const std::string k : {"1", "2", "3"}) {
-    ExpectEnding(Call("run sweep.json --shard " + k + "/3 --out part" + k), 0, {});
+    Expect("run sweep.json --shard " + k + "/3 --out part" + k, 0);
     sum += ReadRecords(folder_ / ("part" + k)).size();
     parts += " part" + k;
   }
   EXPECT_EQ(sum, 20u) << "no case in two shards";
-  ExpectEnding(Call("merge" + parts + " part2 --out merged"), 0, {"of 4 stores: 20 cases"});
+  Expect("merge" + parts + " part2 --out merged", 0, {"of 4 stores: 20 cases"});
   EXPECT_EQ(Hashes(folder_ / "merged"), Hashes(folder_ / "whole"));
-  ExpectEnding(Call("run sweep.json --out merged"), 0, {"ran 0 cases, 20 reused"});
+  Expect("run sweep.json --out merged", 0, {"ran 0 cases, 20 reused"});
   EXPECT_EQ(TableOf(folder_ / "merged"), TableOf(folder_ / "whole"));
 }
 
 TEST_F(Shards, ThatDisagreeAreRefused) {
-  ExpectEnding(Call("run tiny.json --out a"), 0, {});
+  Expect("run tiny.json --out a", 0);
   Record other = ReadRecords(folder_ / "a").front();
   other.Set("state_hash", std::string("0123456789abcdef"));
   ResultStore(folder_ / "b.jsonl").Append(other);
-  ExpectEnding(Call("merge a b.jsonl --out c"), 2,
-               {"a and b.jsonl", "state_hash", "one of the stores is inconsistent"});
+  Expect("merge a b.jsonl --out c", 2,
+         {"a and b.jsonl", "state_hash", "one of the stores is inconsistent"});
   EXPECT_FALSE(fs::exists(folder_ / "c/results.jsonl"));
 }
 
 TEST_F(Shards, AreMergedIntoANewStoreOnly) {
-  ExpectEnding(Call("run tiny.json --out a"), 0, {});
-  ExpectEnding(Call("merge a --out a"), 2, {"expected a new store"});
+  Expect("run tiny.json --out a", 0);
+  Expect("merge a --out a", 2, {"expected a new store"});
   EXPECT_EQ(ReadRecords(folder_ / "a").size(), 2u);
 }
 
 TEST_F(Shards, WithBadNumbersAreRefused) {
   for (const char* shard : {"0/2", "3/2", "1", "1/2x", "-1/2", "a/b", "4294967297/4294967298",
                             "1/4294967298", "1/", "/2", "+1/2", "1/1e3"}) {
-    ExpectEnding(Call(std::string("run tiny.json --shard ") + shard), 2, {"--shard", "k/n"});
+    Expect(std::string("run tiny.json --shard ") + shard, 2, {"--shard", "k/n"});
   }
 }
 
-}  // namespace resume_test
-}  // namespace loopbench::harness
+}  // namespace loopbench::harness::resume_test

@@ -418,19 +418,19 @@ TEST(RobustnessMapFigure, FoldsRowsOfAnExtremeWorstFirst) {
 
 TEST(RobustnessMapFigure, HasAGlyphAndShadeForEachCell) {
   const RobustnessMap map = SmallMap(SmallRecords());
-  const MapDrawing drawing = DrawMap(map);
+  const Drawing drawing = DrawMap(map);
   ExpectWords(drawing.script, {"\"O-DCA\"", "\"singular\"", "\"Two methods\"", "\"33 %\"", "\"?\"",
                                "\"not measured\"", "\"finished, demand not met\"",
                                "\"frame: must hold and does not\""});
   EXPECT_EQ(drawing.script.find("holds, with warnings"), std::string::npos);
   const auto path = std::filesystem::path(testing::TempDir()) / "loopbench-robustness-map.svg";
   std::filesystem::remove(path);
-  const auto error = WriteMapFigure(path, map);
+  const auto error = DrawWithGnuplot(path, drawing);
   ASSERT_FALSE(error.has_value()) << *error;
   const std::string svg = ReadFile(path);
   ExpectWords(svg, {"not measured", "width=\"178.15mm\"", "</svg>"});
   std::filesystem::remove(path);
-  EXPECT_TRUE(WriteMapFigure(path, map, FigureSize::kOneColumn, "no-such-gnuplot")
+  EXPECT_TRUE(DrawWithGnuplot(path, DrawMap(map, FigureSize::kOneColumn), "no-such-gnuplot")
                   ->find("install gnuplot") != std::string::npos);
   EXPECT_FALSE(std::filesystem::exists(path));
 }

@@ -1,9 +1,5 @@
 // Mechanisms written as MJCF and read again: the same bodies, by the same
 // names, accelerate as before.
-#include <gtest/gtest.h>
-
-#include <limits>
-
 #include "harness/config/formulations.h"
 #include "harness/config/mechanism_reader.h"
 #include "harness/exchange/import.h"
@@ -12,8 +8,7 @@
 #include "mechanism/start/assembly.h"
 #include "tests/harness/places.h"
 
-namespace loopbench::harness {
-namespace round_trip_test {
+namespace loopbench::harness::round_trip_test {
 
 struct Accelerations {
   std::map<std::string, Eigen::Matrix<double, 6, 1>> of_bodies;  ///< at centres of mass, in space
@@ -75,7 +70,6 @@ TEST(RoundTrip, ThroughMjcfKeepsAccelerations) {
     // magnified by the condition of the loops; in singular positions the
     // shipped mechanisms have one lost direction and all others well
     // conditioned
-    constexpr double kEps = std::numeric_limits<double>::epsilon();
     const double condition = ours.rcond > kEps ? 1.0 / ours.rcond : 1.0;
     for (const auto& [name, acceleration] : ours.of_bodies) {
       ASSERT_TRUE(theirs.of_bodies.contains(name)) << name;
@@ -88,5 +82,4 @@ TEST(RoundTrip, ThroughMjcfKeepsAccelerations) {
   EXPECT_EQ(compared, 35);
 }
 
-}  // namespace round_trip_test
-}  // namespace loopbench::harness
+}  // namespace loopbench::harness::round_trip_test

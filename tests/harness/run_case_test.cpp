@@ -1,23 +1,11 @@
 // One case from start to record: its contents, that it is the same every time, and how each kind of
 // failure ends in a record that is whole.
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <cmath>
-#include <limits>
-#include <numbers>
-#include <string>
-#include <string_view>
-#include <vector>
-
 #include "harness/base/record.h"
 #include "harness/judge/tables.h"
-#include "harness/run/run.h"
 #include "mechanism/description/library.h"
 #include "tests/reference/cases.h"
 
-namespace loopbench::harness {
-namespace run_case_test {
+namespace loopbench::harness::run_case_test {
 
 using namespace reference;
 
@@ -338,5 +326,4 @@ TEST(WrittenRecord, HoldsNoNanAndNoInfinity) {
   }
 }
 
-}  // namespace run_case_test
-}  // namespace loopbench::harness
+}  // namespace loopbench::harness::run_case_test

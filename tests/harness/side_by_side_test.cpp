@@ -1,22 +1,12 @@
 // Runs that take turns on one thread, and on several; threads of one right-hand side.
-#include <gtest/gtest.h>
 #include <sys/resource.h>
 #include <unistd.h>
 
-#include <algorithm>
-#include <atomic>
-#include <fstream>
-#include <stdexcept>
-#include <string>
-#include <vector>
-
-#include "harness/base/text.h"
 #include "harness/run/run.h"
 #include "mechanism/algebra/lanes.h"
 #include "tests/harness/cli_fixture.h"
 
-namespace loopbench::harness {
-namespace side_by_side_test {
+namespace loopbench::harness::side_by_side_test {
 
 /// Counts those that wait for it.
 class Counter final : public SharedWork {
@@ -170,7 +160,7 @@ TEST_F(CommandLineTest, ThreadsChangeNothingButTimes) {
     "problems": [{"mechanism": {"family": "ladder", "windows": 2100}, "horizon": 0.02}],
     "methods": [{"formulation": "odca", "enforcement": "velocity", "threads": [1, 2]}],
     "tolerances": 1e-6, "timing": {"repeats": 1}})");
-  ExpectEnding(Call("run long.json --out out"), 0, {"ran 4 cases"});
+  Expect("run long.json --out out", 0, {"ran 4 cases"});
   std::string hash;
   int with_threads = 0;
   for (const Record& record : ReadRecords(folder_ / "out")) {
@@ -181,18 +171,17 @@ TEST_F(CommandLineTest, ThreadsChangeNothingButTimes) {
     EXPECT_EQ(record.Text("state_hash"), hash);
   }
   EXPECT_EQ(with_threads, 2);
-  ExpectEnding(Call("list long.json --filter threads=2"), 0, {"threads", "1 case"});
-  ExpectEnding(Call("list long.json --filter threads=3"), 2, {"no case matches"});
-  ExpectEnding(Call("list long.json --filter thread=2"), 2, {"no such key", "threads"});
-  ExpectEnding(Call("run long.json --no-timing --threads 3 --out three"), 0, {"ran 1 case"});
+  Expect("list long.json --filter threads=2", 0, {"threads", "1 case"});
+  Expect("list long.json --filter threads=3", 2, {"no case matches"});
+  Expect("list long.json --filter thread=2", 2, {"no such key", "threads"});
+  Expect("run long.json --no-timing --threads 3 --out three", 0, {"ran 1 case"});
   const std::vector<Record> three = ReadRecords(folder_ / "three");
   ASSERT_EQ(three.size(), 1u) << "columns that differed in threads alone are one";
   EXPECT_EQ(three[0].Text("state_hash"), hash);
   EXPECT_EQ(three[0].Number("threads"), 3.0);
-  ExpectEnding(Call("run long.json --no-timing --threads 3 --filter threads=3 --out three"), 0,
-               {"ran 0 cases, 1 reused"});
-  ExpectEnding(Call("run long.json --threads 0 --out none"), 2, {"--threads"});
+  Expect("run long.json --no-timing --threads 3 --filter threads=3 --out three", 0,
+         {"ran 0 cases, 1 reused"});
+  Expect("run long.json --threads 0 --out none", 2, {"--threads"});
 }
 
-}  // namespace side_by_side_test
-}  // namespace loopbench::harness
+}  // namespace loopbench::harness::side_by_side_test

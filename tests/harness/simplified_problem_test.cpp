@@ -1,15 +1,9 @@
 // Runs of simplified problems have the results of runs of the whole problems.
-#include <gtest/gtest.h>
-
-#include <cmath>
-
-#include "harness/run/run.h"
 #include "mechanism/description/library.h"
 #include "mechanism/description/transforms.h"
 #include "tests/reference/cases.h"
 
-namespace loopbench::harness {
-namespace simplified_problem_test {
+namespace loopbench::harness::simplified_problem_test {
 
 using namespace reference;
 
@@ -28,10 +22,6 @@ Record RunWith(const MechanismFile& file, const CompileOptions& options) {
 double LastAngle(const Record& record, const std::string& joint) {
   const std::vector<double>& angles = record.Numbers("series.angle." + joint);
   return angles.empty() ? std::nan("") : angles.back();
-}
-
-MechanismFile Shipped(const std::string& name) {
-  return ReadMechanism(kConfigs / ("mechanisms/" + name + ".json"));
 }
 
 TEST(SimplifiedProblemTest, NothingToSaveLeavesTheRecordAsItWas) {
@@ -161,5 +151,4 @@ TEST(MergePartsTest, TakesTheWorstAndAddsTheWork) {
   EXPECT_EQ(whole.drift.value, (std::vector<double>{0.0, 2.0, 3.0, 1.0}));
 }
 
-}  // namespace simplified_problem_test
-}  // namespace loopbench::harness
+}  // namespace loopbench::harness::simplified_problem_test

@@ -1,22 +1,10 @@
 // Stiff mechanisms under explicit and implicit profiles, with Jacobians of both kinds: steps,
 // accuracy and records. A system as the integrator sees it: Jacobians, orders.
-#include <gtest/gtest.h>
-
-#include <Eigen/Core>
-#include <algorithm>
-#include <cmath>
-#include <iostream>
-#include <memory>
-#include <string>
-#include <vector>
-
 #include "harness/integrator/arkode.h"
-#include "harness/run/run.h"
 #include "mechanism/start/assembly.h"
 #include "tests/reference/cases.h"
 
-namespace loopbench::harness {
-namespace stiff_case_test {
+namespace loopbench::harness::stiff_case_test {
 
 using namespace reference;
 
@@ -214,5 +202,4 @@ TEST(SystemTest, ImplicitProfilesHaveTheirOrderWithForwardJacobians) {
   }
 }
 
-}  // namespace stiff_case_test
-}  // namespace loopbench::harness
+}  // namespace loopbench::harness::stiff_case_test

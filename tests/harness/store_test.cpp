@@ -1,59 +1,29 @@
 // The store keeps every value exactly, survives a crash, and names what it cannot read.
 #include "harness/base/store.h"
 
-#include <gtest/gtest.h>
 #include <sys/resource.h>
 #include <unistd.h>
 
-#include <cmath>
-#include <filesystem>
-#include <fstream>
-#include <limits>
-#include <new>
-#include <string>
-#include <thread>
-#include <vector>
+#include "tests/harness/records.h"
 
-#include "harness/base/text.h"
-
-namespace loopbench::harness {
-namespace store_test {
-
-testing::AssertionResult Contains(const std::string& text, const std::string& part) {
-  return testing::IsSubstring("part", "text", part, text);
-}
+namespace loopbench::harness::store_test {
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 constexpr double kInf = std::numeric_limits<double>::infinity();
 
 class StoreTest : public testing::Test {
  protected:
-  void SetUp() override {
-    folder_ =
-        std::filesystem::path(testing::TempDir()) /
-        (std::string("loopbench-") + testing::UnitTest::GetInstance()->current_test_info()->name());
-    std::filesystem::remove_all(folder_);
-  }
-  void TearDown() override { std::filesystem::remove_all(folder_); }
-
-  std::filesystem::path folder_;
+  const TemporaryFolder temporary_{"loopbench-store"};
+  const std::filesystem::path folder_ = temporary_.path() / "store";
 };
 
 Record Sample() {
-  Record record;
-  record.Set("kind", std::string("timing"));
-  record.Set("mechanism", std::string("four-bar \"quoted\"\n\xc3\xa9"));
-  record.Set("rtol", 1e-6);
-  record.Set("third", 1.0 / 3.0);
-  record.Set("whole", 2.0);
-  record.Set("tiny", std::numeric_limits<double>::denorm_min());
-  record.Set("minus_zero", -0.0);
-  record.Set("steps", std::int64_t{9007199254740993});
-  record.Set("growth_resolved", true);
-  record.Set("branch_error_max", std::monostate{});
-  record.Set("series.t", std::vector<double>{0.0, 0.1, 1e-300});
-  record.Set("series.empty", std::vector<double>{});
-  return record;
+  return RecordOf("kind", "timing", "mechanism", "four-bar \"quoted\"\n\xc3\xa9", "rtol", 1e-6,
+                  "third", 1.0 / 3.0, "whole", 2.0, "tiny",
+                  std::numeric_limits<double>::denorm_min(), "minus_zero", -0.0, "steps",
+                  std::int64_t{9007199254740993}, "growth_resolved", true, "branch_error_max",
+                  std::monostate{}, "series.t", std::vector<double>{0.0, 0.1, 1e-300},
+                  "series.empty", std::vector<double>{});
 }
 
 TEST_F(StoreTest, EveryValueComesBackWithItsTypeOrderAndBits) {
@@ -65,10 +35,8 @@ TEST_F(StoreTest, EveryValueComesBackWithItsTypeOrderAndBits) {
 }
 
 TEST(RecordJson, NonFiniteNumbersBecomeNull) {
-  Record record;
-  record.Set("drift", kNan);
-  record.Set("energy", -kInf);
-  record.Set("series.drift", std::vector<double>{1.0, kNan, kInf});
+  Record record = RecordOf("drift", kNan, "energy", -kInf, "series.drift",
+                           std::vector<double>{1.0, kNan, kInf});
   const std::string line = ToJsonLine(record);
   EXPECT_TRUE(line.starts_with(
       R"({"format":2,"drift":null,"energy":null,"series.drift":[1.0,null,null],"checksum":")"))
@@ -103,7 +71,7 @@ TEST_F(StoreTest, ATornLastLineIsSkippedWithAWarningAndRemovedBeforeTheNextAppen
   std::vector<std::string> warnings;
   EXPECT_EQ(ReadRecords(file, &warnings).size(), 1u);
   ASSERT_EQ(warnings.size(), 1u);
-  EXPECT_TRUE(Contains(warnings[0], "torn.jsonl:2:"));
+  ExpectWords(warnings[0], {"torn.jsonl:2:"});
 
   Record next;
   next.Set("a", std::int64_t{3});
@@ -188,5 +156,4 @@ TEST(ValueDeathTest, ACopyThatDoesNotFitIntoMemoryThrows) {
   EXPECT_EXIT(_exit(CopiesWithoutMemory()), testing::ExitedWithCode(0), "");
 }
 
-}  // namespace store_test
-}  // namespace loopbench::harness
+}  // namespace loopbench::harness::store_test

@@ -1,17 +1,10 @@
 // Idle freedoms, hints, and the degrees of freedom that a file expects.
-#include <fmt/format.h>
-
 #include "harness/judge/analysis.h"
 #include "tests/harness/cli_fixture.h"
 
-namespace loopbench::harness {
-namespace structure_hints_test {
+namespace loopbench::harness::structure_hints_test {
 
 const std::vector<std::string> kNone;
-
-MechanismDescription Shipped(const std::string& name) {
-  return ReadMechanism(kConfigs / "mechanisms" / (name + ".json")).description;
-}
 
 std::vector<std::string> Idle(const MechanismDescription& description) {
   return NamesOf(description, FindIdleFreedoms(description, AnalyseStructure(description)));
@@ -52,7 +45,7 @@ TEST(IdleFreedomTest, ACouplerBetweenBallsSpins) {
 /// Each leg of two bodies between two balls spins as a whole; with a cylindrical joint inside, both
 /// bodies do, each on its own.
 TEST(IdleFreedomTest, LegsBetweenBallsSpin) {
-  MechanismDescription platform = Shipped("stewart-platform");
+  MechanismDescription platform = Shipped("stewart-platform").description;
   const int freedom = AnalyseStructure(platform).freedom();
   EXPECT_EQ(Idle(platform), kNone);
   for (std::size_t j = 0; j < platform.joints.size(); ++j) {
@@ -86,7 +79,7 @@ TEST(IdleFreedomTest, LegsBetweenBallsSpin) {
 TEST(IdleFreedomTest, MotionsWithAPurposeAreNotIdle) {
   for (const char* name : {"four-bar", "four-bar-in-space", "bennett", "spatial-four-bar", "sarrus",
                            "screw-jack", "double-wishbone", "flyball-governor"}) {
-    EXPECT_EQ(Idle(Shipped(name)), kNone) << name;
+    EXPECT_EQ(Idle(Shipped(name).description), kNone) << name;
   }
   // a door on two balls moves nothing else, but it is all that moves
   const MechanismDescription door =
@@ -107,12 +100,12 @@ TEST(HintsTest, UsualMechanismsHaveNone) {
   for (const char* name :
        {"four-bar", "seven-bar", "andrews-squeezer", "stewart-platform", "slider-crank",
         "locomotive", "simple-pendulum", "rod-pendulum", "double-wishbone", "bennett"}) {
-    EXPECT_EQ(Hints(Shipped(name)), kNone) << name;
+    EXPECT_EQ(Hints(Shipped(name).description), kNone) << name;
   }
 }
 
 TEST(HintsTest, BodiesThatHangAreNamed) {
-  MechanismDescription description = Shipped("four-bar");
+  MechanismDescription description = Shipped("four-bar").description;
   BodyDescription arm = description.bodies[1];
   arm.name = "arm";
   JointDescription hinge = description.joints[0];
@@ -129,11 +122,11 @@ TEST(HintsTest, BodiesThatHangAreNamed) {
   description.bodies.back().com = hinge.to.position;
   EXPECT_EQ(Hints(description), kNone);
   // without loops, chains end with a body
-  EXPECT_EQ(Hints(Shipped("pendulum")), kNone);
+  EXPECT_EQ(Hints(Shipped("pendulum").description), kNone);
 }
 
 TEST(HintsTest, UnitsThatDoNotFitAreNamed) {
-  MechanismDescription grams = Shipped("four-bar"), millimetres = grams;
+  MechanismDescription grams = Shipped("four-bar").description, millimetres = grams;
   grams.bodies[2].mass = 1e3;  // of a slender bar of 1 kg and 1 m, with its inertia in kg m^2
   grams.bodies[2].inertia *= 1.0 / 12.0;
   millimetres.bodies[3].inertia *= 1e6;
@@ -200,5 +193,4 @@ TEST(ExpectedFreedomTest, WrongValuesAreRefused) {
   }
 }
 
-}  // namespace structure_hints_test
-}  // namespace loopbench::harness
+}  // namespace loopbench::harness::structure_hints_test

@@ -232,18 +232,6 @@ TEST(Columns, CompactTablesFitAHundredCharacters) {
   }
 }
 
-TEST(Select, NumbersCompareAsNumbersAndTextAsText) {
-  const Record row = Row("four-bar", "odca", 1e-6);
-  EXPECT_TRUE(Matches(row, {ParseCondition("rtol=1e-6")}));
-  EXPECT_TRUE(Matches(row, {ParseCondition("rtol=0.000001"), ParseCondition("horizon=10")}));
-  EXPECT_TRUE(Matches(row, {ParseCondition("formulation=lagrange,odca")}));
-  EXPECT_FALSE(Matches(row, {ParseCondition("formulation=lagrange"), ParseCondition("rtol=1e-6")}));
-  EXPECT_FALSE(Matches(row, {ParseCondition("absent=1")}));
-  EXPECT_TRUE(Matches(row, {}));
-  EXPECT_EQ(ToText(Selection{ParseCondition("rtol=1e-6,1e-8"), ParseCondition("horizon=10")}),
-            "rtol=1e-6,1e-8 horizon=10");
-}
-
 TEST(Select, FilterKeepsOrder) {
   const std::vector<Record> rows = {Row("a", "odca", 1e-8), Row("b", "odca", 1e-8),
                                     Row("a", "odca", 1e-6)};

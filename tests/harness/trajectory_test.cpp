@@ -2,23 +2,14 @@
 // command line.
 #include "harness/observers/trajectory.h"
 
-#include <fmt/format.h>
-#include <gtest/gtest.h>
 #include <sys/resource.h>
 
-#include <cmath>
-#include <fstream>
-#include <limits>
-#include <sstream>
-
-#include "harness/base/text.h"
 #include "harness/config/experiment_reader.h"
 #include "harness/config/mechanism_reader.h"
 #include "tests/harness/cli_fixture.h"
 #include "tests/harness/in_child.h"
 
-namespace loopbench::harness {
-namespace trajectory_test {
+namespace loopbench::harness::trajectory_test {
 
 /// Names that mean something to CSV, gnuplot, shells, HTML or labels themselves.
 const std::vector<std::string> kHostile = {
@@ -170,7 +161,7 @@ class Command : public CommandLineTest {
  protected:
   /// Each command fails with its text.
   void ExpectRefusals(const std::vector<std::pair<std::string, std::string>>& rows) const {
-    for (const auto& [command, text] : rows) ExpectEnding(Call(command), 2, {text});
+    for (const auto& [command, text] : rows) Expect(command, 2, {text});
   }
   void WriteExperiment(const std::string& output, const std::string& mechanism,
                        const std::string& more = "") const {
@@ -190,7 +181,7 @@ class Command : public CommandLineTest {
   /// Runs the experiment; returns its first trajectory.
   fs::path Ran(const std::string& output, const std::string& mechanism = "four-bar.json") const {
     WriteExperiment(output, mechanism);
-    ExpectEnding(Call("run out.json --out out"), 0, {});
+    Expect("run out.json --out out", 0);
     return Files("out/trajectories").at(0);
   }
   static std::string Shipped(const std::string& name) {
@@ -202,7 +193,7 @@ TEST_F(Command, MistakesOfOutputAreNamed) {
   const auto refused = [&](const std::string& output, const std::string& found,
                            const std::string& more = "") {
     WriteExperiment(output, "four-bar.json", more);
-    ExpectEnding(Call("run out.json --out out"), 2, {found});
+    Expect("run out.json --out out", 2, {found});
     EXPECT_FALSE(fs::exists(folder_ / "out"));
   };
   refused("{}", "/output: found no times, expected one of");
@@ -236,80 +227,26 @@ TEST_F(Command, HostileNamesStayNames) {
   EXPECT_TRUE(FindColumn(rows.columns, "joint", LabelName("line\nend $(touch pwned) `touch pwned`"),
                          "angle"));
   EXPECT_TRUE(FindColumn(rows.columns, "reaction", LabelName("# <b>'=1|x [m]"), "fx"));
-  ExpectEnding(Call(fmt::format("trajectory '{0}' --mechanism hostile.json --compare-with '{0}' "
-                                "--figure own.svg",
-                                file.string())),
-               0, {"by body poses", "wrote own.svg"});
+  Expect(fmt::format("trajectory '{0}' --mechanism hostile.json --compare-with '{0}' "
+                     "--figure own.svg",
+                     file.string()),
+         0, {"by body poses", "wrote own.svg"});
   EXPECT_FALSE(fs::exists(folder_ / "pwned"));
 }
 
 /// One joint of every kind with coordinates, each with values that a user gives: a chain, and
-/// bodies by themselves.
-constexpr const char* kEveryKind =
-    R"({"name": "kinds", "space": "spatial", "gravity": [0, 0, -9.81],
-  "bodies": [BODIES],
-  "joints": [
-    {"name": "r", "type": "revolute", "from": {"body": "ground"}, "to": {"body": "b0", "at": [0.1, 0, 0.2]}, "axis": [1, 2, 2]},
-    {"name": "p", "type": "prismatic", "from": {"body": "b0", "at": [0.3, 0, 0]}, "to": {"body": "b1"}, "axis": [0, 1, 1]},
-    {"name": "s", "type": "pin-in-slot", "from": {"body": "b1"}, "to": {"body": "b2", "at": [0, 0.2, 0]}},
-    {"name": "c", "type": "cylindrical", "from": {"body": "b2", "at": [0, 0, 0.4]}, "to": {"body": "b3"}},
-    {"name": "b", "type": "spherical", "from": {"body": "b3", "at": [0.5, 0, 0]}, "to": {"body": "b4", "at": [0, 0.3, 0]}},
-    {"name": "e", "type": "planar", "from": {"body": "b4"}, "to": {"body": "b5", "at": [0.1, 0.1, 0]}, "axis": [0, 1, 0]},
-    {"name": "u", "type": "universal", "from": {"body": "b5"}, "to": {"body": "b6", "at": [0, 0, 0.2]}},
-    {"name": "h", "type": "helical", "pitch": 0.1, "from": {"body": "b6", "at": [0, 0.2, 0]}, "to": {"body": "b7"}},
-    {"name": "w", "type": "weld", "from": {"body": "b7", "at": [0.2, 0, 0]}, "to": {"body": "b8", "at": [0, 0.1, 0], "rotation": [0.3, 0.2, 0.1]}},
-    {"name": "f", "type": "free", "from": {"body": "ground"}, "to": {"body": "b9", "at": [0, 0, 0.1]}},
-    {"name": "t", "type": "translation", "from": {"body": "ground", "rotation": [0.2, 0.1, 0.3]}, "to": {"body": "b10"}},
-    {"name": "m", "type": "schoenflies", "from": {"body": "ground"}, "to": {"body": "b11", "at": [0, 0.2, 0]}, "axis": [0, 3, 4]},
-    {"name": "l", "type": "point-on-line", "from": {"body": "ground"}, "to": {"body": "b12"}, "axis": [0, 3, 4]},
-    {"name": "n", "type": "point-in-plane", "from": {"body": "ground"}, "to": {"body": "b13"}, "axis": [0, 3, 4]}],
-  "initial": {"coordinates": {"r": 7.5, "p": 0.3, "s": [0.4, 0.2], "c": [-4.0, 0.1], "b": [0.8, 0.2, 0.4, 0.4],
-      "e": [0.7, 0.1, -0.2], "u": [0.3, -0.5], "h": 9.0, "f": [0.5, 0.5, -0.5, 0.5, 1, 2, 3],
-      "t": [0.1, 0.2, 0.3], "m": [0.4, 0.1, 0.2, 0.3], "l": [0.8, 0.2, 0.4, 0.4, 0.3], "n": [0.8, -0.2, 0.4, 0.4, 0.1, 0.2]},
-    "fixed": ["r", "p", "s", "c", "b", "e", "u", "h", "f", "t", "m", "l", "n"],
-    "speeds": {"r": 1.0, "p": -0.2, "s": [0.3, 0.1], "c": [0.5, -0.3], "b": [0.1, 0.2, 0.3],
-      "e": [0.4, 0.2, 0.1], "u": [0.6, -0.4], "h": -0.5, "f": [1, -2, 0.5, 0.1, 0.2, 0.3],
-      "t": [0.1, -0.2, 0.3], "m": [0.5, 0.1, 0.2, 0.3], "l": [0.1, 0.2, 0.3, 0.4], "n": [0.3, 0.2, 0.1, 0.4, 0.5]}}})";
-
-/// The user's values for kEveryKind, as columns.
-constexpr const char* kGivenValues =
-    R"(r:angle [rad] = 7.5; p:shift [m] = 0.3; s:angle [rad] = 0.4; s:shift [m] = 0.2;
-  c:shift [m] = 0.1; b:qw [1] = 0.8; b:qx [1] = 0.2; b:qy [1] = 0.4; b:qz [1] = 0.4;
-  e:angle [rad] = 0.7; e:x [m] = 0.1; e:y [m] = -0.2; u:angle about x [rad] = 0.3;
-  u:angle about y [rad] = -0.5; h:angle [rad] = 9.0; f:qw [1] = 0.5; f:qz [1] = 0.5;
-  f:x [m] = 1; f:z [m] = 3; r:angle speed [rad/s] = 1; p:shift speed [m/s] = -0.2;
-  s:angle speed [rad/s] = 0.3; s:shift speed [m/s] = 0.1; c:angle speed [rad/s] = 0.5;
-  c:shift speed [m/s] = -0.3; b:wx [rad/s] = 0.1; b:wz [rad/s] = 0.3;
-  e:angle speed [rad/s] = 0.4; e:x speed [m/s] = 0.2; u:angle about x speed [rad/s] = 0.6;
-  u:angle about y speed [rad/s] = -0.4; h:angle speed [rad/s] = -0.5; f:wy [rad/s] = -2;
-  f:y speed [m/s] = 0.2; t:x [m] = 0.1; t:z speed [m/s] = 0.3; m:angle [rad] = 0.4;
-  m:z [m] = 0.3; m:angle speed [rad/s] = 0.5; m:y speed [m/s] = 0.2; l:qx [1] = 0.2;
-  l:x [m] = 0.3; l:wz [rad/s] = 0.3; l:x speed [m/s] = 0.4; n:qx [1] = -0.2; n:y [m] = 0.2;
-  n:wx [rad/s] = 0.3; n:y speed [m/s] = 0.5;)";
-
-std::string EveryKind() {
-  std::string bodies, text = kEveryKind;
-  for (int i = 0; i < 14; ++i) {
-    bodies += fmt::format(
-        R"({}{{"name": "b{}", "mass": 1, "inertia": [0.1, 0.2, 0.15], "com": [0.05, 0.1, 0]}})",
-        i == 0 ? "" : ", ", i);
-  }
-  return text.replace(text.find("BODIES"), 6, bodies);
-}
-
+/// bodies by themselves. The values are in every-kind-values.txt, by column.
 TEST_F(Command, EveryKindOfJointHasTheCoordinatesThatTheUserGave) {
-  Write("kinds.json", EveryKind());
+  Write("kinds.json", TestData("every-kind.json"));
   for (const char* coordinates : {"joint", "absolute"}) {
     WriteExperiment(R"({"step": 0.01})", "kinds.json");
-    ExpectEnding(
-        Call(fmt::format("run out.json --out {0} --set /methods/0/coordinates={0}", coordinates)),
-        0, {});
+    Expect(fmt::format("run out.json --out {0} --set /methods/0/coordinates={0}", coordinates), 0);
     const fs::path file = Files(std::string(coordinates) + "/trajectories").at(0);
     const Trajectory rows = ReadTrajectory(file);
     ASSERT_EQ(rows.rows(), 101u);
-    std::istringstream given(kGivenValues);
+    std::istringstream given(TestData("every-kind-values.txt"));
     int number = 0;
-    for (std::string item; std::getline(given >> std::ws, item, ';'); ++number) {
+    for (std::string item; std::getline(given, item); ++number) {
       const std::string label = item.substr(0, item.find(" = "));
       const double value = std::stod(item.substr(item.find(" = ") + 3));
       // products of ten frames, and in absolute coordinates back
@@ -344,12 +281,11 @@ TEST_F(Command, EveryKindOfJointHasTheCoordinatesThatTheUserGave) {
 TEST_F(Command, AnExportComesBackWithTheDriftOfTheRecord) {
   for (const char* name : {"four-bar", "double-wishbone", "stewart-platform", "bennett"}) {
     WriteExperiment(R"({"accepted_steps": true})", Shipped(name));
-    ExpectEnding(Call("run out.json --out " + std::string(name)), 0, {});
+    Expect("run out.json --out " + std::string(name), 0);
     const std::vector<Record> records = ReadRecords(folder_ / name);
     ASSERT_EQ(records.size(), 1u);
     const MechanismDescription user = ReadMechanism(Shipped(name)).description;
-    ExpectEnding(Call(fmt::format("trajectory {0} --out {0}/theirs --columns body:", name)), 0,
-                 {"rows"});
+    Expect(fmt::format("trajectory {0} --out {0}/theirs --columns body:", name), 0, {"rows"});
     const fs::path theirs = Files(std::string(name) + "/theirs").at(0);
     const TrajectoryCheck check = CheckTrajectory(theirs, user);
     EXPECT_EQ(check.source, "body poses");
@@ -370,8 +306,7 @@ TEST_F(Command, AnExportComesBackWithTheDriftOfTheRecord) {
           << name;
     }
     // by the joints of the tree alone: what its cut joints then miss
-    ExpectEnding(Call(fmt::format("trajectory {0} --out {0}/joints --columns joint:", name)), 0,
-                 {});
+    Expect(fmt::format("trajectory {0} --out {0}/joints --columns joint:", name), 0);
     const TrajectoryCheck closure =
         CheckTrajectory(Files(std::string(name) + "/joints").at(0), user);
     EXPECT_EQ(closure.source, "joint coordinates");
@@ -383,11 +318,11 @@ TEST_F(Command, AnExportComesBackWithTheDriftOfTheRecord) {
 
 TEST_F(Command, WhatIsMissingIsNamed) {
   Write("theirs.csv", "t [s],joint:OA:angle [rad],body:bar1:x [m]\n0,0,0\n");
-  ExpectEnding(Call("trajectory theirs.csv --mechanism four-bar.json"), 2,
-               {"found neither the poses of all bodies nor the coordinates", "\"body:bar1:y [m]\"",
-                "\"joint:AB:angle [rad]\""});
+  Expect("trajectory theirs.csv --mechanism four-bar.json", 2,
+         {"found neither the poses of all bodies nor the coordinates", "\"body:bar1:y [m]\"",
+          "\"joint:AB:angle [rad]\""});
   Write("theirs.csv", "t [s],x [m]\n0,0\n");
-  ExpectEnding(Call("run tiny.json --out out"), 0, {});
+  Expect("run tiny.json --out out", 0);
   ExpectRefusals(
       {{"trajectory theirs.csv --compare-with theirs.csv", "found no column that both have"},
        {"trajectory out", "found no trajectory"},
@@ -402,14 +337,14 @@ TEST_F(Command, ChangedFilesBesideAStoreFailGates) {
   for (const char* folder : {"mechanisms", "trajectories"}) {
     fs::remove_all(folder_ / "copy");
     fs::copy(folder_ / "out", folder_ / "copy", fs::copy_options::recursive);
-    ExpectEnding(Call("compare out copy"), 0, {"NO CHANGE"});
+    Expect("compare out copy", 0, {"NO CHANGE"});
     const fs::path file = Files(std::string("copy/") + folder).at(0);
     std::string text = ReadFile(file);
     const std::size_t digit = text.find_last_of("123456789");
     text[digit] = text[digit] == '1' ? '2' : '1';
-    WriteFileAtomically(file, text);
+    WriteFileAtomically(file, text, Onto::kAnyFile);
     for (const char* command : {"compare out copy", "check-claims copy --claims claims.json"}) {
-      ExpectEnding(Call(command), 2, {file.filename().string(), "changed after its run wrote it"});
+      Expect(command, 2, {file.filename().string(), "changed after its run wrote it"});
     }
   }
 }
@@ -417,7 +352,7 @@ TEST_F(Command, ChangedFilesBesideAStoreFailGates) {
 TEST_F(Command, OptionsWithoutEffectAreRejected) {
   Write("ours.csv", "t [s],joint:OA:angle [rad]\n0,0\n");
   const std::string ours = "trajectory ours.csv ";
-  ExpectEnding(Call(ours + "--compare-with ours.csv --out x.csv"), 2, {"--compare-with", "--out"});
+  Expect(ours + "--compare-with ours.csv --out x.csv", 2, {"--compare-with", "--out"});
   ExpectRefusals({{ours + "--where rtol=1", "--where: found a trajectory, 'ours.csv'"},
                   {ours + "--format jsonl", "--format requires --out"},
                   {ours + "--every 2", "--every requires --out"},
@@ -464,34 +399,34 @@ TEST_F(Command, AMotionWithoutNumbersIsAnError) {
   for (const char* command : {"trajectory theirs.csv --mechanism four-bar.json",
                               "trajectory theirs.csv --compare-with ours.csv"}) {
     write(5, "");
-    ExpectEnding(Call(command), 0, {});
+    Expect(command, 0);
     for (const char* cell : {"nan", "inf", "-inf", ""}) {
       for (const std::size_t from : {0u, 1u, 4u}) {
         write(from, cell);
-        ExpectEnding(Call(command), 2, {"theirs.csv:", "expected a finite number"});
+        Expect(command, 2, {"theirs.csv:", "expected a finite number"});
       }
     }
     write(5, "", 0);
-    ExpectEnding(Call(command), 2, {"theirs.csv:1: found no row"});
+    Expect(command, 2, {"theirs.csv:1: found no row"});
   }
   write(1, "nan");
-  ExpectEnding(Call("trajectory ours.csv --compare-with theirs.csv"), 2,
-               {"theirs.csv:3: found nan in", "expected a finite number"});
-  ExpectEnding(Call("trajectory theirs.csv --compare-with theirs.csv"), 2, {"found nan in"});
+  Expect("trajectory ours.csv --compare-with theirs.csv", 2,
+         {"theirs.csv:3: found nan in", "expected a finite number"});
+  Expect("trajectory theirs.csv --compare-with theirs.csv", 2, {"found nan in"});
   write(1, "");
   for (const char* command : {"trajectory theirs.csv --mechanism four-bar.json",
                               "trajectory theirs.csv --compare-with ours.csv",
                               "trajectory ours.csv --compare-with theirs.csv"}) {
-    ExpectEnding(Call(command), 2, {"theirs.csv:3: found an empty cell in"});
+    Expect(command, 2, {"theirs.csv:3: found an empty cell in"});
   }
   // numbers whose energy is none
   write(1, "1e300");
-  ExpectEnding(Call("trajectory theirs.csv --mechanism four-bar.json"), 0, {"energy: not checked"});
+  Expect("trajectory theirs.csv --mechanism four-bar.json", 0, {"energy: not checked"});
   // columns of another unit are not compared
   Write("degrees.csv", "t [s],joint:OA:angle [rad],joint:AB:angle [deg],x [m]\n0,0,0,0\n");
-  ExpectEnding(Call("trajectory degrees.csv --compare-with ours.csv"), 0,
-               {"2 columns of degrees.csv not compared: joint:AB:angle [deg], x [m]",
-                " of ours.csv not compared: "});
+  Expect("trajectory degrees.csv --compare-with ours.csv", 0,
+         {"2 columns of degrees.csv not compared: joint:AB:angle [deg], x [m]",
+          " of ours.csv not compared: "});
   Write("empty.csv", "t [s],joint:OA:angle [rad]\n");
   Write("latin.csv", "t [s],w\xFC [m]\n0,0\n");
   ExpectRefusals({{"trajectory empty.csv", "empty.csv:1: found no row, expected a motion"},
@@ -500,8 +435,7 @@ TEST_F(Command, AMotionWithoutNumbersIsAnError) {
                    "latin.csv: label 2, byte 3: found the byte FC, which is not UTF-8"}});
   EXPECT_FALSE(fs::exists(folder_ / "copy.csv"));
   Write("early.csv", "t [s],joint:OA:angle [rad]\n-1,0\n0,0\n");
-  ExpectEnding(Call("trajectory early.csv --compare-with ours.csv"), 0,
-               {"1 of 2 rows are not compared"});
+  Expect("trajectory early.csv --compare-with ours.csv", 0, {"1 of 2 rows are not compared"});
 }
 
 /// Coordinates of joints determine all poses, whatever a coupling says about them.
@@ -522,40 +456,40 @@ TEST_F(Command, CouplingsAreCheckedToo) {
   };
   const std::string check = "trajectory theirs.csv --mechanism pair.json";
   write(0.0, -1.0);
-  ExpectEnding(Call(check), 0, {"coupling mesh", "0.00e+00                      0.00e+00"});
+  Expect(check, 0, {"coupling mesh", "0.00e+00                      0.00e+00"});
   write(2 * M_PI, -1.0);
-  ExpectEnding(Call(check), 0, {"0.00e+00                      0.00e+00"});
+  Expect(check, 0, {"0.00e+00                      0.00e+00"});
   // 40 (0.5 + 0.2 * 4) / 20 rad at 0.2 s, 40 * 4 / 20 rad/s
   write(0.5, 3.0);
-  ExpectEnding(Call(check), 0, {"2.60e+00                      8.00e+00"});
+  Expect(check, 0, {"2.60e+00                      8.00e+00"});
 }
 
 TEST_F(Command, WholeTurnsAndRowsInBetweenAreNamed) {
   const std::string columns = "t [s],joint:thread:angle [rad]\n";
   Write("ours.csv", columns + "0,0\n1,1\n2,2\n3,3\n");
   Write("theirs.csv", columns + fmt::format("0,{}\n1,1\n1.5,1.5\n", 4 * M_PI));
-  ExpectEnding(Call("trajectory theirs.csv --compare-with ours.csv"), 0,
-               {"1 of 3 rows are compared with cubics through the rows of ours.csv",
-                "joint:thread:angle [rad]: besides, 2 whole turns at 0 s"});
+  Expect("trajectory theirs.csv --compare-with ours.csv", 0,
+         {"1 of 3 rows are compared with cubics through the rows of ours.csv",
+          "joint:thread:angle [rad]: besides, 2 whole turns at 0 s"});
 }
 
 TEST_F(Command, MergeCarriesTrajectoriesAndAResumedRunLeavesNoParts) {
   Write("two.json", std::string(kTinyExperiment).insert(1, R"("output": {"number": 3},)"));
-  ExpectEnding(Call("run two.json --out one --shard 1/2"), 0, {});
-  ExpectEnding(Call("run two.json --out two --shard 2/2"), 0, {});
-  ExpectEnding(Call("merge one two --out whole"), 0, {"2 cases"});
+  Expect("run two.json --out one --shard 1/2", 0);
+  Expect("run two.json --out two --shard 2/2", 0);
+  Expect("merge one two --out whole", 0, {"2 cases"});
   EXPECT_EQ(Files("whole/trajectories").size(), 2u);
-  ExpectEnding(Call("trajectory whole"), 0, {"dense output"});
+  Expect("trajectory whole", 0, {"dense output"});
   // what a killed run leaves goes with the next one
   Write("whole/trajectories/0123.csv.part", "t [s]\n0");
-  ExpectEnding(Call("run two.json --out whole"), 0, {"ran 0 cases"});
+  Expect("run two.json --out whole", 0, {"ran 0 cases"});
   EXPECT_EQ(Files("whole/trajectories").size(), 2u);
   // a process that crashes takes its part along
   ExpectEnding(Call("run two.json --out crashed", "LOOPBENCH_FAULT=crash:formulation=odca"), 0,
                {"not finished"});
   EXPECT_EQ(Files("crashed/trajectories").size(), 1u);
   fs::remove_all(folder_ / "one/trajectories");
-  ExpectEnding(Call("trajectory one"), 2, {"missing; run --rerun all writes it"});
+  Expect("trajectory one", 2, {"missing; run --rerun all writes it"});
 }
 
 TEST_F(Command, OneLineReadsItInGnuplotAndPandas) {
@@ -568,8 +502,7 @@ TEST_F(Command, OneLineReadsItInGnuplotAndPandas) {
       R"(set datafile separator comma; plot "rows.csv" using "t [s]":"joint:OA:angle [rad]" with lines)";
   const std::string frame =
       R"(import pandas; rows = pandas.read_csv("rows.csv", comment="#", index_col="t [s]"))";
-  EXPECT_NE(trajectories_md.find(plot), std::string::npos);
-  EXPECT_NE(trajectories_md.find(frame), std::string::npos);
+  ExpectWords(trajectories_md, {plot, frame});
   const auto run = [&](const std::string& command) {
     return std::system(("cd '" + folder_.string() + "' && " + command + " >log 2>&1").c_str());
   };
@@ -603,5 +536,4 @@ TEST(Compared, RowsMeetAtTheirTimes) {
   for (const int row : {1, 2, 3}) EXPECT_NEAR(apart[row], 0.5, 1e-14);  // a cubic is met exactly
 }
 
-}  // namespace trajectory_test
-}  // namespace loopbench::harness
+}  // namespace loopbench::harness::trajectory_test

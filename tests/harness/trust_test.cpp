@@ -1,30 +1,17 @@
 // Planted wrong results: each is flagged by its reference or, without a reference, by its own
 // warnings and by disagreement. Correct results are not flagged.
-#include <gtest/gtest.h>
-
-#include <cmath>
-#include <string>
-#include <vector>
-
-#include "harness/base/text.h"
 #include "harness/judge/analysis.h"
 #include "harness/observers/reference.h"
-#include "harness/run/run.h"
 #include "tests/harness/records.h"
 #include "tests/reference/cases.h"
 #ifdef LOOPBENCH_PRECISIONS
 #include "harness/precision/make_reference.h"
 #endif
 
-namespace loopbench::harness {
-namespace trust_test {
+namespace loopbench::harness::trust_test {
 
 using namespace reference;
 using enum Enforcement;
-
-MechanismFile Shipped(const std::string& name) {
-  return ReadMechanism(kConfigs / "mechanisms" / (name + ".json"));
-}
 
 Record RunOne(const MechanismFile& file, const Method& method, double rtol, double horizon,
               const Reference* reference = nullptr) {
@@ -127,6 +114,47 @@ TEST(Trust, DriveThatStepsPassBy) {
   EXPECT_EQ(aliased.Number("drive_frequency"), 2000.0);
   const Record seen = RunOne(file, kOdca, 1e-12, 0.2);
   EXPECT_FALSE(HasWarning(seen, kDriveWarning)) << seen.Number("step_longest");
+}
+
+TEST(Trust, SpringThatPassesZeroLength) {
+  // a mass on a line, pulled to its middle with 5 N + x: x = 6 cos t - 5
+  const auto on_line = [](double start, double preload) {
+    return ParseMechanism(fmt::format(R"({{"name": "line", "gravity": [0, 0],
+          "bodies": [{{"name": "m", "mass": 1, "inertia": 1}}],
+          "joints": [{{"name": "s", "type": "prismatic", "from": {{"body": "ground"}},
+                      "to": {{"body": "m"}}}}],
+          "forces": [{{"type": "spring_damper", "from": {{"body": "ground"}}, "to": {{"body": "m"}},
+                      "stiffness": 1, "preload": {}}}],
+          "initial": {{"coordinates": {{"s": {}}}}}}})",
+                                      preload, start),
+                          "line.json");
+  };
+  const Record free = RunOne(on_line(1.0, 0.0), kOdca, 1e-8, 2.0);
+  EXPECT_FALSE(HasWarning(free)) << free.Text("warnings");
+  const Record near = RunOne(on_line(1.0, 5.0), kOdca, 1e-8, 0.3);
+  EXPECT_FALSE(HasWarning(near)) << near.Text("warnings");
+  const Record passing = RunOne(on_line(1.0, 5.0), kOdca, 1e-8, 0.7);
+  EXPECT_TRUE(HasWarning(passing, kSpringWarning)) << passing.Text("warnings");
+  EXPECT_EQ(passing.Text("spring_reversal"), "spring_damper between ground and m");
+  EXPECT_NEAR(passing.Number("spring_reversal_t"), std::acos(5.0 / 6.0), 0.05);
+  const Record resting = RunOne(on_line(0.0, -5.0), kOdca, 1e-8, 1.0);
+  EXPECT_TRUE(HasWarning(resting, kSpringWarning)) << resting.Text("warnings");
+  EXPECT_EQ(resting.Number("spring_reversal_t"), 0.0);
+}
+
+// A spring of 1 m from a wheel's pivot to its rim: steps of some radians.
+TEST(Trust, SpringsThatTurnPassNoZeroLength) {
+  const MechanismFile wheel = ParseMechanism(R"({
+    "name": "wheel", "gravity": [0, 0], "ground": {"points": {"O": [0, 0]}},
+    "bodies": [{"name": "p", "mass": 1, "inertia": 1, "points": {"A": [1, 0]}}],
+    "joints": [{"name": "J", "type": "revolute", "from": {"body": "ground"}, "to": {"body": "p"}}],
+    "forces": [{"type": "spring_damper", "from": {"body": "ground", "at": "O"},
+                "to": {"body": "p", "at": "A"}, "stiffness": 10, "length": 0.5}],
+    "initial": {"coordinates": {"J": 0}, "fixed": ["J"], "speeds": {"J": 30}}})",
+                                             "wheel.json");
+  const Record record = RunOne(wheel, kOdca, 1e-6, 1.0);
+  EXPECT_GT(record.Number("step_longest") * 30.0, 2.7);  // beyond 154 degrees
+  EXPECT_FALSE(HasWarning(record, kSpringWarning)) << record.Text("warnings");
 }
 
 TEST(Trust, StepControlThatStruggles) {
@@ -274,5 +302,4 @@ TEST(ReferenceFile, ReadsBackInEveryBitAndRefusesDamage) {
 
 #endif
 
-}  // namespace trust_test
-}  // namespace loopbench::harness
+}  // namespace loopbench::harness::trust_test

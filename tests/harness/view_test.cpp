@@ -52,14 +52,6 @@ Picture PictureOf(const std::string& name) {
   return MakePicture(ReadMechanism(kConfigs / "mechanisms" / (name + ".json")).description, "");
 }
 
-std::size_t Count(const std::string& text, const std::string& word) {
-  std::size_t count = 0;
-  for (std::size_t at = text.find(word); at != std::string::npos; at = text.find(word, at + 1)) {
-    ++count;
-  }
-  return count;
-}
-
 bool HasBadNumber(const std::string& text) {
   static const std::regex bad("[ \",:\\[LM](nan|-nan|inf|-inf)[ \",\\]LMZ]");
   return std::regex_search(text, bad);
@@ -78,7 +70,7 @@ TEST(View, EveryShippedMechanismIsDrawn) {
       EXPECT_LT(svg.size(), 60'000u);
     }
     const std::string html = ToHtml(picture);
-    EXPECT_EQ(Count(html, "</script>"), 2u);
+    EXPECT_EQ(CountOf(html, "</script>"), 2u);
     EXPECT_FALSE(HasBadNumber(ToJson(picture)));
     for (const Table& table : ToTables(picture)) EXPECT_FALSE(HasBadNumber(ToText(table)));
   }
@@ -229,7 +221,7 @@ TEST(View, SizeOfTheMechanismChangesNothingButTheScale) {
   // hundredth
   const std::string whole = drawn(1.0);
   const auto words = [](const std::string& svg) {
-    return Count(svg, "<path") + Count(svg, "<text");
+    return CountOf(svg, "<path") + CountOf(svg, "<text");
   };
   for (const double factor : {0x1p-20, 0x1p20}) {
     const std::string other = drawn(factor);
@@ -271,7 +263,7 @@ TEST(View, NamesAreOnlyShown) {
   const std::string svg = ToSvg(picture, {}), html = ToHtml(picture), data = ToJson(picture);
   EXPECT_EQ(FaultOfXml(svg), "");
   EXPECT_EQ(svg.find("<img"), std::string::npos);
-  EXPECT_EQ(Count(html, "</script>"), 2u);
+  EXPECT_EQ(CountOf(html, "</script>"), 2u);
   EXPECT_EQ(html.find("<img"), std::string::npos);
   EXPECT_EQ(data.find_first_of("<>&\n\x1b"), std::string::npos);
   EXPECT_EQ(data.find("\xe2\x80\xa8"), std::string::npos);

@@ -271,12 +271,6 @@ std::string Statement(const std::vector<Record>& records) {
   return Joined(FairnessStatement(MakeWorkPrecision(records, {})), "\n");
 }
 
-void ExpectNone(const std::string& text, std::initializer_list<std::string> words) {
-  for (const std::string& word : words) {
-    EXPECT_EQ(text.find(word), std::string::npos) << word << " in\n" << text;
-  }
-}
-
 TEST(Fairness, SaysWhatWasEqualAndWhatWasNot) {
   std::vector<Record> records = Store({1e-3, 1e-6, 1e-9}, {0.1, 0.2, 0.4});
   const std::string alike = Statement(records);

@@ -1,9 +1,7 @@
 // Whether a document is well-formed XML, as far as Loopbench writes any.
 #pragma once
 
-#include <regex>
-#include <string>
-#include <vector>
+#include "tests/standard.h"
 
 namespace loopbench::harness {
 

@@ -1,21 +1,8 @@
 // Consistent starts from partial data.
-#include "mechanism/start/assembly.h"
-
-#include <gtest/gtest.h>
-
-#include <cmath>
-#include <cstdio>
-#include <limits>
-#include <numbers>
-
-#include "mechanism/description/library.h"
 #include "mechanism/loops/tree_dynamics.h"
 #include "tests/mechanism/shipped.h"
 
-namespace loopbench {
-namespace assembly_test {
-
-constexpr double kEps = std::numeric_limits<double>::epsilon();
+namespace loopbench::assembly_test {
 
 /// The paper's four-bar with its pins `ground` apart; crank at -1 rad, the others guessed.
 MechanismDescription FourBar(double ground) {
@@ -170,7 +157,7 @@ TEST(AssemblyTest, AHeldCutJointIsReached) {
 
 /// A spring acts at the angle beside the joint's guess, or beside 0, whichever joint is cut.
 TEST(AssemblyTest, AnglesOfCutJointsCountFromTheirGuesses) {
-  constexpr double kTurn = 2.0 * std::numbers::pi, kStiffness = 10.0;
+  constexpr double kTurn = 2.0 * kPi, kStiffness = 10.0;
   const Start<double> at = Assembled<>(FourBar(1.5)).start;
   // the loop closes in the plane: angles between its bars add up to 0
   const double angles[] = {at.q[0], at.q[1], at.q[2], -at.q.sum()};
@@ -287,5 +274,4 @@ TEST(AssemblyTest, PerturbMovesHeldCoordinatesAndIsDeterministic) {
   EXPECT_NE(moved, Perturb(d, 1e-3, 8, 2).initial.coordinates[0].values[0]);
 }
 
-}  // namespace assembly_test
-}  // namespace loopbench
+}  // namespace loopbench::assembly_test

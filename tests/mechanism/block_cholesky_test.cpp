@@ -1,17 +1,12 @@
 // Sparse factors of small blocks against dense ones.
 #include "mechanism/algebra/block_cholesky.h"
 
-#include <gtest/gtest.h>
-
 #include <Eigen/Dense>
-#include <limits>
-#include <numeric>
-#include <random>
 
-namespace loopbench {
-namespace block_cholesky_test {
+#include "tests/standard.h"
 
-constexpr double kEps = std::numeric_limits<double>::epsilon();
+namespace loopbench::block_cholesky_test {
+
 constexpr double kNoLimit = 1e9;
 
 using Pairs = std::vector<std::pair<int, int>>;
@@ -179,5 +174,4 @@ TEST(BlockCholeskyTest, TellsWhatPivotsHaveLost) {
   EXPECT_EQ(std::min(factors.ratio(0), factors.ratio(1)), 0.0);
 }
 
-}  // namespace block_cholesky_test
-}  // namespace loopbench
+}  // namespace loopbench::block_cholesky_test

@@ -2,15 +2,6 @@
 // accelerations of the user's, which the long double oracle knows.
 #include "mechanism/simplify/compile.h"
 
-#include <gtest/gtest.h>
-
-#include <Eigen/Geometry>
-#include <algorithm>
-#include <cmath>
-#include <utility>
-#include <vector>
-
-#include "mechanism/description/library.h"
 #include "mechanism/description/transforms.h"
 #include "mechanism/formulation/system.h"
 #include "mechanism/loops/tree_dynamics.h"
@@ -19,8 +10,7 @@
 #include "tests/contract/generators.h"
 #include "tests/mechanism/shipped.h"
 
-namespace loopbench::testing {
-namespace compile_test {
+namespace loopbench::testing::compile_test {
 
 /// What the savings may change, relative to the largest acceleration, where loops are conditioned
 /// better than 1e-2: rounding of frames and masses (16 eps) over that, with a factor for sums.
@@ -418,5 +408,4 @@ TEST(CompilePlanarTest, ForcesAndGravityAlongTheNormalAreDroppedAndReported) {
   EXPECT_EQ(compiled.parts[0].description.gravity.z(), 0.0);
 }
 
-}  // namespace compile_test
-}  // namespace loopbench::testing
+}  // namespace loopbench::testing::compile_test

@@ -2,21 +2,12 @@
 // number of loops; and no eigenvalue that is round-off.
 #include "mechanism/loops/direction_weights.h"
 
-#include <gtest/gtest.h>
-
-#include <Eigen/Cholesky>
-#include <cmath>
-#include <limits>
-
 #include "mechanism/algebra/symmetric_eigen.h"
-#include "mechanism/description/library.h"
 #include "mechanism/loops/scaled_loops.h"
-#include "mechanism/start/assembly.h"
 #include "tests/contract/comparison.h"
 #include "tests/mechanism/shipped.h"
 
-namespace loopbench {
-namespace direction_weights_test {
+namespace loopbench::direction_weights_test {
 
 DirectionWeights<double> WeightsOf(MatrixX<double> X, std::span<const int> rows) {
   DirectionWeights<double> weights(rows);
@@ -95,5 +86,4 @@ TEST(DirectionWeightsTest, WhatIsNotFiniteIsLeftOut) {
   for (int i = 0; i < 4; ++i) EXPECT_TRUE(weights.IsLeftOut(i));
 }
 
-}  // namespace direction_weights_test
-}  // namespace loopbench
+}  // namespace loopbench::direction_weights_test

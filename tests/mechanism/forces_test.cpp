@@ -1,16 +1,9 @@
 // Wrenches of all forces against the oracle, against their potential and against their power.
-#include <gtest/gtest.h>
-
-#include <cmath>
-#include <limits>
-#include <utility>
-
 #include "mechanism/description/library.h"
 #include "mechanism/model/kinematics.h"
 #include "tests/mechanism/samples.h"
 
-namespace loopbench {
-namespace forces_test {
+namespace loopbench::forces_test {
 
 using testing::ForBothSets;
 using testing::kKind;
@@ -19,8 +12,6 @@ using testing::Real;
 using testing::Real6;
 using testing::State;
 using testing::ToReal;
-
-constexpr double kEps = std::numeric_limits<double>::epsilon();
 
 template <class Space>
 std::vector<MechanismDescription> Samples() {
@@ -247,5 +238,4 @@ TEST(ForceElementsTest, WhatIsWrongWithAForceIsNamed) {
   }
 }
 
-}  // namespace forces_test
-}  // namespace loopbench
+}  // namespace loopbench::forces_test

@@ -1,20 +1,15 @@
 // Joint kinds: motion maps and rates against derivatives of the transforms.
 #include "mechanism/model/joint.h"
 
-#include <gtest/gtest.h>
-
-#include <limits>
-
 #include "tests/contract/oracle.h"
+#include "tests/standard.h"
 
-namespace loopbench {
-namespace joint_test {
+namespace loopbench::joint_test {
 
 using testing::Jet;
 using testing::JetPose;
 using testing::Real;
 
-constexpr double kEps = std::numeric_limits<double>::epsilon();
 constexpr double kParameter = 0.3;  // pitch [m/rad] or length [m]; for other kinds nothing
 
 template <class Space>
@@ -254,5 +249,4 @@ TEST(HelixTest, TurnsAreCounted) {
   }
 }
 
-}  // namespace joint_test
-}  // namespace loopbench
+}  // namespace loopbench::joint_test

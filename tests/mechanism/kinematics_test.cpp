@@ -1,28 +1,16 @@
 // Poses, motions and velocity terms against the oracle's differentiated poses.
-#include "mechanism/model/kinematics.h"
-
-#include <gtest/gtest.h>
-
-#include <cmath>
-#include <limits>
-
-#include "mechanism/description/library.h"
 #include "mechanism/loops/tree_dynamics.h"
 #include "mechanism/simplify/compile.h"
-#include "mechanism/start/assembly.h"
 #include "tests/mechanism/samples.h"
 #include "tests/mechanism/shipped.h"
 
-namespace loopbench {
-namespace kinematics_test {
+namespace loopbench::kinematics_test {
 
 using testing::kKind;
 using testing::Oracle;
 using testing::Real;
 using testing::State;
 using testing::ToReal;
-
-constexpr double kEps = std::numeric_limits<double>::epsilon();
 
 /// Trees with every joint kind, reversed joints, a floating body; graphs with closing joints.
 template <class Space>
@@ -288,5 +276,4 @@ TEST(MeasuredAngles, CountTurnsByTheLastSpeedInSpace) {
   }
 }
 
-}  // namespace kinematics_test
-}  // namespace loopbench
+}  // namespace loopbench::kinematics_test

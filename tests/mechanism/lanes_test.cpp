@@ -1,17 +1,9 @@
 // Lanes: sines and cosines against long double, moves from lane to lane.
 #include "mechanism/algebra/lanes.h"
 
-#include <gtest/gtest.h>
+#include "tests/standard.h"
 
-#include <algorithm>
-#include <cmath>
-#include <limits>
-#include <numbers>
-#include <random>
-#include <vector>
-
-namespace loopbench {
-namespace lanes_test {
+namespace loopbench::lanes_test {
 
 /// Distance from a long double in units of the last place of the result.
 double Ulps(double value, long double exact) {
@@ -30,7 +22,7 @@ std::vector<double> Angles() {
   for (int i = 0; i < 200000; ++i) {
     const double x = std::exp(exponent(generator));
     angles.push_back(i % 2 == 0 ? x : -x);
-    const double near = std::nearbyint(x) * (std::numbers::pi / 2);
+    const double near = std::nearbyint(x) * (kPi / 2);
     if (near > kLargestAngle) continue;
     angles.push_back(near);
     angles.push_back(std::nextafter(near, 0.0));
@@ -74,5 +66,4 @@ TEST(Lanes, MoveOnAndBack) {
   }
 }
 
-}  // namespace lanes_test
-}  // namespace loopbench
+}  // namespace loopbench::lanes_test

@@ -1,17 +1,10 @@
 // Sparse least-squares problems against dense orthogonal factors.
 #include "mechanism/start/least_squares.h"
 
-#include <gtest/gtest.h>
-
-#include <limits>
-#include <random>
-
 #include "mechanism/algebra/decompositions.h"
+#include "tests/standard.h"
 
-namespace loopbench {
-namespace least_squares_test {
-
-constexpr double kEps = std::numeric_limits<double>::epsilon();
+namespace loopbench::least_squares_test {
 
 /// Rows of five entries each, in a band as loops of a ladder have them; beyond what is called small
 /// from 300 rows on. The last `repeated` rows are sums of two earlier ones.
@@ -81,5 +74,4 @@ TEST(LeastSquaresTest, DampedMinimisesBoth) {
   }
 }
 
-}  // namespace least_squares_test
-}  // namespace loopbench
+}  // namespace loopbench::least_squares_test

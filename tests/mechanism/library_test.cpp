@@ -1,15 +1,9 @@
 // Families of mechanisms: their loops, degrees of freedom and starts.
-#include "mechanism/description/library.h"
-
-#include <gtest/gtest.h>
-
 #include "mechanism/formulation/system.h"
-#include "mechanism/start/assembly.h"
 #include "odca/odca.h"
 #include "tests/mechanism/shipped.h"
 
-namespace loopbench {
-namespace library_test {
+namespace loopbench::library_test {
 
 template <class Space>
 void ExpectShape(const MechanismDescription& description, int loops, int freedom) {
@@ -54,5 +48,4 @@ TEST(LibraryTest, AGridStartsWhereItSays) {
   }
 }
 
-}  // namespace library_test
-}  // namespace loopbench
+}  // namespace loopbench::library_test

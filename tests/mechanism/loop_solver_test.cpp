@@ -2,23 +2,15 @@
 // neither masses nor units have a say.
 #include "mechanism/loops/loop_solver.h"
 
-#include <gtest/gtest.h>
-
-#include <Eigen/LU>
-#include <algorithm>
-#include <limits>
-
 #include "lagrange/lagrange.h"
 #include "mechanism/formulation/system.h"
 #include "odca/odca.h"
 #include "tests/contract/comparison.h"
 
-namespace loopbench {
-namespace loop_solver_test {
+namespace loopbench::loop_solver_test {
 
 using testing::Random;
 
-constexpr double kEps = std::numeric_limits<double>::epsilon();
 const std::vector<int> kRows = {2, 3};
 
 MatrixX<double> RandomMatrix(int rows, int columns, std::uint64_t seed) {
@@ -212,5 +204,4 @@ TEST(LoopSolverTest, UnitsChangeNeitherRankNorSolution) {
   }
 }
 
-}  // namespace loop_solver_test
-}  // namespace loopbench
+}  // namespace loopbench::loop_solver_test

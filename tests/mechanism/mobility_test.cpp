@@ -1,17 +1,10 @@
 // Whether anything moves: first order, and at all. And that far centres of mass and other parts
 // have no say in it.
-
-#include <gtest/gtest.h>
-
-#include <numbers>
-
-#include "mechanism/description/library.h"
 #include "mechanism/description/transforms.h"
 #include "mechanism/simplify/structure.h"
 #include "tests/mechanism/shipped.h"
 
-namespace loopbench {
-namespace mobility_test {
+namespace loopbench::mobility_test {
 
 using testing::Shipped;
 using testing::TautChain;
@@ -127,5 +120,4 @@ TEST(RankOfGeometry, KnowsEachPartByItself) {
   }
 }
 
-}  // namespace mobility_test
-}  // namespace loopbench
+}  // namespace loopbench::mobility_test

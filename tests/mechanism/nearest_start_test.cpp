@@ -1,20 +1,7 @@
 // Starts nearest to their guesses.
-#include <gtest/gtest.h>
-
-#include <Eigen/Geometry>
-#include <cmath>
-#include <limits>
-#include <numbers>
-#include <random>
-
-#include "mechanism/description/library.h"
-#include "mechanism/start/assembly.h"
 #include "tests/mechanism/shipped.h"
 
-namespace loopbench {
-namespace nearest_start_test {
-
-constexpr double kEps = std::numeric_limits<double>::epsilon();
+namespace loopbench::nearest_start_test {
 
 using testing::Assembled;
 
@@ -90,7 +77,7 @@ TEST(NearestStart, IsStationaryAlongFreeMotions) {
   EXPECT_LT(free.norm(), 1e-2 * apart.norm());
 }
 
-double ModuloTurn(double angle) { return std::remainder(angle, 2 * std::numbers::pi); }
+double ModuloTurn(double angle) { return std::remainder(angle, 2 * kPi); }
 
 /// Angles A and C of a start of the rocker.
 template <class Space>
@@ -111,10 +98,10 @@ void ExpectNearestPositions(int starts) {
   const auto random = [&] { return static_cast<double>(generator() >> 11) * 0x1p-52 - 1.0; };
   int farther_exists = 0;
   for (int tried = 0; tried < starts;) {
-    const double crank = std::numbers::pi * random();
+    const double crank = kPi * random();
     const std::vector<Eigen::Vector2d> positions = RockerPositions(crank);
     if (positions.empty()) continue;
-    const double most = tried % 2 == 0 ? 1.0 : std::numbers::pi;
+    const double most = tried % 2 == 0 ? 1.0 : kPi;
     const Eigen::Vector2d guess = positions[0] + most * Eigen::Vector2d(random(), random());
     ++tried;
     MechanismDescription d = Rocker(crank, guess[0], guess[1]);
@@ -124,7 +111,7 @@ void ExpectNearestPositions(int starts) {
     ASSERT_EQ(start.outcome, Outcome::kFinished) << start.message;
     EXPECT_EQ(start.q[0], crank);
     const Eigen::Vector2d found = AngleAC(at);
-    EXPECT_LE((found - guess).cwiseAbs().maxCoeff(), std::numbers::pi * (1 + 4 * kEps))
+    EXPECT_LE((found - guess).cwiseAbs().maxCoeff(), kPi * (1 + 4 * kEps))
         << "wound: from " << guess.transpose() << " to " << found.transpose();
     const double nearest = std::min(Away(guess, positions[0]), Away(guess, positions[1]));
     farther_exists += Away(guess, positions[1]) < Away(guess, positions[0]);
@@ -181,7 +168,7 @@ TEST(NearestStartTest, AGuessOnTheJointThatClosesTheLoopDecides) {
         MechanismDescription d = Rocker(crank, 0.0, 0.0);
         d.initial.coordinates.resize(1);
         d.joints[3].cut = true;
-        const double angle = right[1] - right[0] - crank + 2 * std::numbers::pi * turns;
+        const double angle = right[1] - right[0] - crank + 2 * kPi * turns;
         d.initial.coordinates.push_back({3, {angle + 0.1}});
         const Assembled<> at(d);
         const Start<double>& start = at.start;
@@ -318,5 +305,4 @@ TEST(NearestStartTest, HeldValuesAreExact) {
   }
 }
 
-}  // namespace nearest_start_test
-}  // namespace loopbench
+}  // namespace loopbench::nearest_start_test

@@ -1,23 +1,11 @@
 // Starts from poses of bodies and positions of points.
 #include "mechanism/start/poses.h"
 
-#include <gtest/gtest.h>
-
-#include <Eigen/Geometry>
-#include <cmath>
-#include <limits>
-#include <numbers>
-
-#include "mechanism/description/library.h"
-#include "mechanism/model/kinematics.h"
 #include "tests/mechanism/shipped.h"
 
-namespace loopbench {
-namespace poses_test {
+namespace loopbench::poses_test {
 
 using Eigen::Vector3d;
-
-constexpr double kEps = std::numeric_limits<double>::epsilon();
 
 /// Two bars of 2 m and 1.5 m in series on a pin of Ground.
 MechanismDescription Arm() {
@@ -62,9 +50,8 @@ TEST(Poses, AFixedPointIsMetWithTheElbowNearestToTheGuess) {
 
 TEST(Poses, PointAndDirectionTogether) {
   MechanismDescription d = Arm();
-  d.initial.poses = {
-      {.body = 1, .rotation = Vector3d(0.0, 0.0, 0.8), .fixed = true},
-      {.body = 2, .rotation = Vector3d(0.0, 0.0, -2.0 + 2 * std::numbers::pi), .fixed = true}};
+  d.initial.poses = {{.body = 1, .rotation = Vector3d(0.0, 0.0, 0.8), .fixed = true},
+                     {.body = 2, .rotation = Vector3d(0.0, 0.0, -2.0 + 2 * kPi), .fixed = true}};
   const Start<double> start = StartOf<Planar>(&d);
   EXPECT_NEAR(start.q[0], 0.8, 256 * kEps);
   EXPECT_NEAR(start.q[1], -2.8, 256 * kEps);  // not wound by the turn in the target
@@ -139,8 +126,7 @@ TEST(Poses, OfALoopAreClosedPositions) {
     const testing::Assembled<> at(one);
     ASSERT_EQ(at.start.outcome, Outcome::kFinished) << at.start.message;
     // met: the last of some quadratic steps
-    EXPECT_NEAR(std::remainder(at.kinematics.poses()[3].angle - angle, 2 * std::numbers::pi), 0.0,
-                1e-8);
+    EXPECT_NEAR(std::remainder(at.kinematics.poses()[3].angle - angle, 2 * kPi), 0.0, 1e-8);
     EXPECT_LE(at.start.position_residual, 64 * kEps);
   }
 }
@@ -170,5 +156,4 @@ TEST(Poses, OfFreeBodiesInSpace) {
   EXPECT_LE((p - *d.initial.poses[0].at).norm(), 256 * kEps);
 }
 
-}  // namespace poses_test
-}  // namespace loopbench
+}  // namespace loopbench::poses_test

@@ -1,19 +1,11 @@
 // Which constraints are redundant at generic positions, and what is left without them.
 #include "mechanism/simplify/redundancy.h"
 
-#include <gtest/gtest.h>
-
-#include <cmath>
-#include <numbers>
-
-#include "mechanism/description/library.h"
 #include "mechanism/loops/scaled_loops.h"
 #include "mechanism/loops/self_stress.h"
-#include "mechanism/start/assembly.h"
 #include "tests/mechanism/shipped.h"
 
-namespace loopbench {
-namespace redundancy_test {
+namespace loopbench::redundancy_test {
 
 using testing::Shipped;
 
@@ -171,9 +163,9 @@ TEST(RedundancyTest, CouplingsThatFollowFromLoopsReplaceConstraints) {
   EXPECT_EQ(both.couplings, (std::vector<std::string>{"legs", "level"}));
 
   // angles of a start beyond a turn
-  d.initial.coordinates[0].values[0] += 2 * std::numbers::pi;
-  const Redundancy turned = find({{"level", level.parts, 2 * std::numbers::pi}});
-  d.initial.coordinates[0].values[0] -= 2 * std::numbers::pi;
+  d.initial.coordinates[0].values[0] += 2 * kPi;
+  const Redundancy turned = find({{"level", level.parts, 2 * kPi}});
+  d.initial.coordinates[0].values[0] -= 2 * kPi;
   EXPECT_EQ(turned.rank, 4);
   EXPECT_EQ(Count(turned.released), 2);
 
@@ -200,7 +192,7 @@ TEST(RedundancyTest, AStartAtRestInItsLowestPositionMayBeSingular) {
   // the energy of the start takes it nowhere, and there the rank is not that of other positions
   MechanismDescription hanging = Shipped("parallelogram-in-space");
   hanging.initial.speeds.clear();
-  hanging.initial.coordinates = {{0, {-std::numbers::pi / 2}}, {1, {0.0}}, {2, {std::numbers::pi}}};
+  hanging.initial.coordinates = {{0, {-kPi / 2}}, {1, {0.0}}, {2, {kPi}}};
   const Redundancy found = FindRedundancy(hanging);
   EXPECT_EQ(found.rank_at_start, 1);
   EXPECT_EQ(found.rank, 2);
@@ -267,5 +259,4 @@ TEST(RedundancyTest, ReleasedDirectionsAreStillMeasured) {
   EXPECT_EQ(b.joints()[3].rows(), 2);
 }
 
-}  // namespace redundancy_test
-}  // namespace loopbench
+}  // namespace loopbench::redundancy_test

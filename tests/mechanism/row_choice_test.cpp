@@ -1,17 +1,11 @@
 // The choice of independent rows under quotas, against all choices.
 #include "mechanism/loops/row_choice.h"
 
-#include <gtest/gtest.h>
-
 #include <Eigen/SVD>
-#include <algorithm>
-#include <array>
-#include <bit>
-#include <random>
-#include <vector>
 
-namespace loopbench {
-namespace row_choice_test {
+#include "tests/standard.h"
+
+namespace loopbench::row_choice_test {
 
 constexpr int kRows = 10, kColumns = 5;
 
@@ -82,5 +76,4 @@ TEST(RowChoice, MovesARowOutOfAJointWhereAnotherOneNeedsItsPlace) {
   EXPECT_EQ(released[1].directions, std::vector<int>{1});
 }
 
-}  // namespace row_choice_test
-}  // namespace loopbench
+}  // namespace loopbench::row_choice_test

@@ -1,12 +1,8 @@
 // Samples in both coordinate sets, for tests of kinematics and forces against the oracle.
 #pragma once
 
-#include <gtest/gtest.h>
-
-#include <utility>
-#include <vector>
-
 #include "tests/contract/generators.h"
+#include "tests/standard.h"
 
 namespace loopbench::testing {
 

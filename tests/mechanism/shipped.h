@@ -1,19 +1,15 @@
 // Mechanisms of configs/mechanisms by name, parts of others, and starts.
 #pragma once
 
-#include <string>
-
-#include "harness/config/mechanism_reader.h"
 #include "mechanism/description/library.h"
 #include "mechanism/model/kinematics.h"
 #include "mechanism/start/assembly.h"
+#include "tests/harness/places.h"
 
 namespace loopbench::testing {
 
 inline MechanismDescription Shipped(const std::string& name) {
-  return harness::ReadMechanism(std::string(LOOPBENCH_SOURCE_DIR) + "/configs/mechanisms/" + name +
-                                ".json")
-      .description;
+  return harness::Shipped(name).description;
 }
 
 /// A mechanism and its kinematics at the start that Assemble() returns.

@@ -1,17 +1,10 @@
 // What each idea of model.h takes, on mechanisms whose answer is known on paper.
-#include <gtest/gtest.h>
-
-#include <cmath>
-#include <numbers>
-
-#include "mechanism/description/library.h"
 #include "mechanism/simplify/model.h"
 #include "mechanism/simplify/restart.h"
 #include "tests/contract/generators.h"
 #include "tests/mechanism/shipped.h"
 
-namespace loopbench::testing {
-namespace simplify_test {
+namespace loopbench::testing::simplify_test {
 
 const Eigen::Vector3d kOrigin = Eigen::Vector3d::Zero(), kX = Eigen::Vector3d::UnitX();
 
@@ -363,5 +356,4 @@ TEST(SimplifiedTest, RandomMechanismsHaveModelsThatStart) {
   EXPECT_GT(applied, 20) << "otherwise nothing was tested";
 }
 
-}  // namespace simplify_test
-}  // namespace loopbench::testing
+}  // namespace loopbench::testing::simplify_test

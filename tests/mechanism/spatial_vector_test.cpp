@@ -2,18 +2,11 @@
 // forces there are.
 #include "mechanism/algebra/spatial_vector.h"
 
-#include <gtest/gtest.h>
-
-#include <Eigen/Geometry>
-#include <limits>
-
 #include "mechanism/algebra/space.h"
 #include "tests/contract/generators.h"
+#include "tests/standard.h"
 
-namespace loopbench {
-namespace spatial_vector_test {
-
-constexpr double kEps = std::numeric_limits<double>::epsilon();
+namespace loopbench::spatial_vector_test {
 
 template <class A, class B>
 concept Addable = requires(A a, B b) {
@@ -131,5 +124,4 @@ TEST(QuaternionTest, OrientationsGoThereAndBack) {
   }
 }
 
-}  // namespace spatial_vector_test
-}  // namespace loopbench
+}  // namespace loopbench::spatial_vector_test

@@ -1,16 +1,9 @@
 // Facts of mechanisms whose structure is known on paper.
 #include "mechanism/simplify/structure.h"
 
-#include <gtest/gtest.h>
-
-#include <cmath>
-#include <numbers>
-
-#include "mechanism/description/library.h"
 #include "tests/mechanism/shipped.h"
 
-namespace loopbench {
-namespace structure_test {
+namespace loopbench::structure_test {
 
 using testing::Shipped;
 
@@ -145,8 +138,7 @@ TEST(StructureTest, NearlyFlatTriangleIsBadlyConditioned) {
     const Eigen::Vector3d tip = length * Eigen::Vector3d::UnitX();
     d.joints = {Revolute("A", 0, O, 1, O), Revolute("B", 0, {2.0, 0.0, 0.0}, 2, O),
                 Revolute("C", 1, tip, 2, tip)};
-    d.initial.coordinates = {{0, {std::atan2(h, 1.0)}},
-                             {1, {std::numbers::pi - std::atan2(h, 1.0)}}};
+    d.initial.coordinates = {{0, {std::atan2(h, 1.0)}}, {1, {kPi - std::atan2(h, 1.0)}}};
     const Structure s = AnalyseStructure(d);
     // the second direction is lost like the height
     EXPECT_LT(s.conditioning(), 3.0 * h);
@@ -155,5 +147,4 @@ TEST(StructureTest, NearlyFlatTriangleIsBadlyConditioned) {
   }
 }
 
-}  // namespace structure_test
-}  // namespace loopbench
+}  // namespace loopbench::structure_test

@@ -1,21 +1,14 @@
 // Given functions of time against an evaluation written anew, and against their own differences.
 #include "mechanism/description/time_function.h"
 
-#include <gtest/gtest.h>
-
-#include <cmath>
-#include <limits>
-
 #include "tests/contract/time_oracle.h"
+#include "tests/standard.h"
 
-namespace loopbench {
-namespace time_function_test {
+namespace loopbench::time_function_test {
 
 using testing::Jet;
 using testing::OracleAt;
 using testing::Real;
-
-constexpr double kEps = std::numeric_limits<double>::epsilon();
 
 struct Sample {
   const char* name;
@@ -157,5 +150,4 @@ TEST(TimeFunctionTest, WhatIsWrongWithADescriptionIsNamed) {
   EXPECT_NE(Validate(TimeTable{.times = {0.0, NAN}, .values = {1.0, 2.0}}), "");
 }
 
-}  // namespace time_function_test
-}  // namespace loopbench
+}  // namespace loopbench::time_function_test

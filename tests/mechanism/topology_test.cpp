@@ -1,16 +1,12 @@
 // From the user's graph to a spanning forest: which joints are cut, in which order bodies come.
 #include "mechanism/description/topology.h"
 
-#include <gtest/gtest.h>
-
-#include <algorithm>
-
 #include "mechanism/description/library.h"
 #include "mechanism/model/mechanism.h"
 #include "tests/contract/generators.h"
+#include "tests/standard.h"
 
-namespace loopbench {
-namespace topology_test {
+namespace loopbench::topology_test {
 
 /// Four-bar whose joints are listed OA, AB, BC, OC and carry no values.
 MechanismDescription FourBar() {
@@ -95,5 +91,4 @@ TEST(TopologyTest, ReversedJointsAreWalkedAgainstTheirDirection) {
   EXPECT_EQ(mechanism.tree()[1].sign, -1);
 }
 
-}  // namespace topology_test
-}  // namespace loopbench
+}  // namespace loopbench::topology_test

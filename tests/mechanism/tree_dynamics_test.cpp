@@ -1,23 +1,17 @@
 // M, h, J and gamma of the spanning forest against the oracle's.
 #include "mechanism/loops/tree_dynamics.h"
 
-#include <gtest/gtest.h>
-
-#include <limits>
-
 #include "mechanism/algebra/decompositions.h"
 #include "mechanism/algebra/factors.h"
 #include "tests/contract/generators.h"
+#include "tests/standard.h"
 
-namespace loopbench {
-namespace tree_dynamics_test {
+namespace loopbench::tree_dynamics_test {
 
 using testing::Equations;
 using testing::Oracle;
 using testing::State;
 using testing::ToReal;
-
-constexpr double kEps = std::numeric_limits<double>::epsilon();
 
 template <class Space>
 class TreeDynamicsTest : public ::testing::Test {
@@ -121,5 +115,4 @@ TYPED_TEST(TreeDynamicsTest, JacobianIsTheDerivativeOfTheMismatch) {
   });
 }
 
-}  // namespace tree_dynamics_test
-}  // namespace loopbench
+}  // namespace loopbench::tree_dynamics_test

@@ -1,14 +1,9 @@
 // Threads that share pieces of work.
 #include "mechanism/algebra/worker_pool.h"
 
-#include <gtest/gtest.h>
+#include "tests/standard.h"
 
-#include <chrono>
-#include <numeric>
-#include <set>
-
-namespace loopbench {
-namespace worker_pool_test {
+namespace loopbench::worker_pool_test {
 
 TEST(WorkerPool, DoesEachPieceOnce) {
   for (const int threads : {1, 2, 3, 8}) {
@@ -56,5 +51,4 @@ TEST(WorkerPool, WorkersThatSleepWakeUp) {
   }
 }
 
-}  // namespace worker_pool_test
-}  // namespace loopbench
+}  // namespace loopbench::worker_pool_test

@@ -1,18 +1,10 @@
 // The sweep along arms against the general one, which the contract suite holds to an oracle.
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <cmath>
-#include <cstdio>
-#include <limits>
-
 #include "mechanism/description/library.h"
 #include "mechanism/description/transforms.h"
 #include "odca/arm_links.h"
 #include "tests/odca/served.h"
 
-namespace loopbench::odca::arms {
-namespace arm_sweep_test {
+namespace loopbench::odca::arms::arm_sweep_test {
 
 Both Compare(const Mechanism<Spatial, double>& mechanism, SpeedsUsed speeds, const Numbers& q,
              const Numbers& u, int bodies_of_group = kBodiesOfGroup) {
@@ -148,29 +140,4 @@ TEST(ArmSweep, LeavesOthersToTheGeneralSweep) {
   EXPECT_EQ(make(testing::SphericalChain(6, 1)), nullptr) << "axes through one point, likewise";
 }
 
-TEST(RevoluteKernels, TakeAsManyOperationsAsTheySay) {
-  Response<Counted, kRows> B;
-  Response<Counted, kAll> tip;
-  Free<Counted> free;
-  Cut<Counted> cut;
-  EndCut<Counted, kRows> end_cut;
-  EndCut<Counted, kAll> tip_cut;
-  OneHandle<Counted> end;
-  Piece<Counted> piece;
-  Turn<Counted> turn;
-  Counted slack, F[kAll], force[kAll], zeta[kAll], row[kRows], all[kAll];
-  EXPECT_EQ(ProductsOf([&] { Join(piece, turn, B, free, cut, slack); }), Operations::kJoin);
-  EXPECT_EQ(ProductsOf([&] { Join(end, turn, B, zeta, zeta, end_cut, slack); }),
-            Operations::EndJoin(kRows));
-  EXPECT_EQ(ProductsOf([&] { Join(end, turn, tip, zeta, zeta, tip_cut, slack); }),
-            Operations::EndJoin(kAll));
-  EXPECT_EQ(ProductsOf([&] { ForceIn(cut, B.zeta12, F, F, force); }), Operations::kForceIn);
-  EXPECT_EQ(ProductsOf([&] { ForceIn(end_cut, F, force); }), Operations::ForceInEnd(kRows));
-  EXPECT_EQ(ProductsOf([&] { ForceIn(tip_cut, F, force); }), Operations::ForceInEnd(kAll));
-  EXPECT_EQ(ProductsOf([&] { About(slack, row, row, F, F); }), Operations::About(kRows));
-  EXPECT_EQ(ProductsOf([&] { About(slack, row, all, F, F); }), Operations::About(kAll));
-  EXPECT_EQ(ProductsOf([&] { OppositeBefore(turn, F, force); }), Operations::kOpposite);
-}
-
-}  // namespace arm_sweep_test
-}  // namespace loopbench::odca::arms
+}  // namespace loopbench::odca::arms::arm_sweep_test

@@ -1,17 +1,9 @@
 // The sweep over assemblies of pins against the general one, which the contract suite holds to an
 // oracle. What every short cut must do is in short_cut_test.cpp.
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <cstdio>
-#include <utility>
-
 #include "mechanism/description/library.h"
-#include "tests/contract/allocations.h"
 #include "tests/odca/served.h"
 
-namespace loopbench::odca::pins {
-namespace assembly_sweep_test {
+namespace loopbench::odca::pins::assembly_sweep_test {
 
 using Model = Mechanism<Planar, double>;
 
@@ -215,5 +207,4 @@ TEST(AssemblySweep, LeavesManyPinsOnABodyToTheGeneralSweep) {
   EXPECT_EQ(Make(Model(Hub(300, 1, false), Coordinates::kJoint)), nullptr) << "300 handles";
 }
 
-}  // namespace assembly_sweep_test
-}  // namespace loopbench::odca::pins
+}  // namespace loopbench::odca::pins::assembly_sweep_test

@@ -1,11 +1,5 @@
 // Mechanisms of extreme structure: the accelerations satisfy every joint and every body's equation
 // of motion, and cost what the plan promises.
-#include <gtest/gtest.h>
-
-#include <cmath>
-#include <cstdio>
-#include <limits>
-
 #include "mechanism/description/library.h"
 #include "mechanism/loops/tree_dynamics.h"
 #include "odca/odca.h"
@@ -13,12 +7,9 @@
 #include "tests/contract/comparison.h"
 #include "tests/contract/system_with.h"
 
-namespace loopbench::odca {
-namespace extremes_test {
+namespace loopbench::odca::extremes_test {
 
 constexpr SpaceKind kPlane = SpaceKind::kPlanar, kSpace = SpaceKind::kSpatial;
-constexpr double kEps = std::numeric_limits<double>::epsilon();
-
 struct Residuals {
   double joints = 0.0;  ///< of D^T (A_Q - A_P - g), against the largest acceleration
   double bodies = 0.0;  ///< of M A + gyroscopic - applied - joint forces, against the largest force
@@ -143,5 +134,4 @@ TEST(ExtremesTest, SmallOnesAgreeWithTheOracle) {
   loops.Finish();
 }
 
-}  // namespace extremes_test
-}  // namespace loopbench::odca
+}  // namespace loopbench::odca::extremes_test

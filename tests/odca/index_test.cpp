@@ -1,19 +1,9 @@
 // The index of the paper's equations in odca/README.md against the code: it names all 72, each
 // once; what it names is there; and the numbers stand in the comments of what it names.
-#include <gtest/gtest.h>
-
-#include <filesystem>
-#include <map>
-#include <regex>
-#include <set>
-#include <sstream>
-#include <string>
-#include <vector>
-
 #include "harness/base/text.h"
+#include "tests/standard.h"
 
-namespace loopbench::odca {
-namespace index_test {
+namespace loopbench::odca::index_test {
 
 namespace fs = std::filesystem;
 
@@ -169,5 +159,4 @@ TEST(PaperIndexTest, CommentsCiteWhatTheIndexMapsToTheirFile) {
   EXPECT_GE(citations, 40u);
 }
 
-}  // namespace index_test
-}  // namespace loopbench::odca
+}  // namespace loopbench::odca::index_test

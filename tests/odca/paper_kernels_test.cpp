@@ -1,45 +1,104 @@
 // The kernels of short cuts against the paper's formulas as they are printed.
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <cmath>
-#include <vector>
-
 #include "odca/arm_links.h"
 #include "odca/path_links.h"
 #include "tests/odca/paper_series.h"
 
-namespace loopbench::odca::paper {
-namespace paper_kernels_test {
+namespace loopbench::odca::paper::paper_kernels_test {
 
-/// Returns the numbers of a kernel, which are projected on the D of planar revolute joints.
-RealMatrix ToReal(const pins::Matrix2<double>& A) {
-  RealMatrix real(2, 2);
-  real << A.xx, A.xy, A.yx, A.yy;
+template <int n>
+RealMatrix ToReal(const Symmetric<double, n>& A) {
+  RealMatrix real(n, n);
+  for (int i = 0; i < n; ++i) {
+    for (int j = 0; j <= i; ++j) real(i, j) = real(j, i) = A(i, j);
+  }
   return real;
 }
-RealMatrix ToReal(const pins::Symmetric2<double>& A) {
-  return ToReal(pins::Matrix2<double>{A.xx, A.xy, A.xy, A.yy});
-}
-RealMatrix ToReal(const pins::Vector2<double>& a) {
-  RealMatrix real(2, 1);
-  real << a.x, a.y;
-  return real;
-}
-/// The largest difference between a two-handle kernel's numbers and those of printed equations.
-Deviation Difference(const pins::TwoHandle<double>& kernel, const TwoHandles& printed) {
-  Deviation deviation;
-  deviation.Note(ToReal(kernel.zeta11), printed.z11.bottomRightCorner(2, 2));
-  deviation.Note(ToReal(kernel.zeta22), printed.z22.bottomRightCorner(2, 2));
-  deviation.Note(ToReal(kernel.zeta12), printed.z12.bottomRightCorner(2, 2));
-  deviation.Note(ToReal(kernel.zeta13), printed.z13.tail(2));
-  deviation.Note(ToReal(kernel.zeta23), printed.z23.tail(2));
-  return deviation;
+template <int n>
+RealMatrix Column(const double (&numbers)[n]) {
+  RealMatrix column(n, 1);
+  for (int i = 0; i < n; ++i) column(i, 0) = numbers[i];
+  return column;
 }
 
-/// Free bodies of chains of pins, by the kernels of two_handle.h: leaves (1-4), and joins of one
-/// after another (15-17), (26-30).
-TEST(PaperTest, TwoHandleKernelsAreThePrintedFormulas) {
+/// A body between two joints: its kernel alone and behind a joint that moves, and the rows on the D
+/// of both handles.
+template <int n>
+struct Link {
+  int body = 0, joint = 0, after = 0;
+  RealMatrix on_1, on_2;
+  TwoHandle<double, n> alone, behind;
+};
+
+/// Joins the bodies of a chain one after another (15-17), (26-30). `turn(k, assembly)` turns an
+/// assembly into the axes of body k. Kernels take `gravity` from all accelerations. Axes of joint
+/// sides are products of up to so many `rotations`, the chain has so many `bodies`.
+template <class Space, int n>
+void HoldChain(const Scene<Space>& scene, const std::vector<Link<n>>& links,
+               const RealVector& gravity, const auto& turn, int rotations, int bodies,
+               Tally& tally) {
+  TwoHandle<double, n> all;
+  TwoHandles printed;
+  double rcond = 1.0;
+  const auto difference = [&](const TwoHandle<double, n>& kernel, const TwoHandles& expected,
+                              const RealMatrix& on_1, const RealMatrix& on_2) {
+    RealMatrix z12(n, n);
+    for (int i = 0; i < n; ++i) {
+      for (int j = 0; j < n; ++j) z12(i, j) = kernel.response.zeta12[i][j];
+    }
+    Deviation deviation;
+    deviation.Note(ToReal(kernel.response.zeta11), on_1 * expected.z11 * on_1.transpose());
+    deviation.Note(ToReal(kernel.response.zeta22), on_2 * expected.z22 * on_2.transpose());
+    deviation.Note(z12, on_1 * expected.z12 * on_2.transpose());
+    deviation.Note(Column(kernel.zeta13), on_1 * (expected.z13 - gravity));
+    deviation.Note(Column(kernel.zeta23), on_2 * (expected.z23 - gravity));
+    return deviation;
+  };
+  for (int k = 0; k < static_cast<int>(links.size()); ++k) {
+    const Link<n>& at = links[k];
+    const TwoHandles body = scene.Body(at.body, at.joint, at.after);
+    tally.Hold("leaf", difference(at.alone, body, at.on_1, at.on_2), kMargin * rotations * kEps);
+    if (k == 0) {
+      all = at.alone;
+      printed = body;
+      continue;
+    }
+    InnerCut<double, n> cut;
+    double slack = 0.0;
+    turn(k, all);
+    JoinSeries(all, at.behind.response, at.behind.zeta13, at.behind.zeta23, 0.0, cut, slack);
+    EXPECT_EQ(slack, 0.0);
+    const Cut joint = scene.JointTo(at.body, at.joint);
+    const SeriesJoin join(printed, body, joint);
+    rcond = std::min(rcond, Rcond(join.X));
+    const double bound = kMargin * bodies * kEps / rcond;
+    const double all_F[] = {0.3, -0.7, 0.2, 1.1, -0.4, 0.9, 0.1};
+    double F1[n], F2[n], force[n];
+    std::copy_n(all_F, n, F1);
+    std::copy_n(all_F + 2, n, F2);
+    ForceIn(cut, at.behind.response, F1, F2, force);
+    const RealVector f =
+        joint.D * MeasureNumbers(printed, body, joint, join, links[0].on_1.transpose() * Column(F1),
+                                 at.on_2.transpose() * Column(F2));
+    Deviation deviation;
+    deviation.Note(Column(force), at.on_1 * f);
+    tally.Hold("force", deviation, bound);
+    printed = Assemble(printed, body, join);
+    tally.Hold("Upsilon", difference(all, printed, links[0].on_1, at.on_2), bound);
+    ++tally.assemblies;
+  }
+}
+
+template <int n>
+TwoHandle<double, n> Handles(const odca::Response<double, n>& response, const auto& free) {
+  TwoHandle<double, n> all;
+  all.response = response;
+  std::copy_n(free.zeta13, n, all.zeta13);
+  std::copy_n(free.zeta23, n, all.zeta23);
+  return all;
+}
+
+/// Free bodies of chains of pins, by the kernels of handles.h and pins.h.
+TEST(PaperTest, PinKernelsAreThePrintedFormulas) {
   constexpr int n = 7;
   Tally tally;
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {
@@ -47,48 +106,28 @@ TEST(PaperTest, TwoHandleKernelsAreThePrintedFormulas) {
     MechanismDescription chain = ChainOf(std::vector(n + 1, JointType::kRevolute), b);
     chain.forces.clear();
     const Scene<Planar> scene(chain, seed);
-    const auto links =
+    const auto path =
         pins::MeasurePath(scene.mechanism(),
                           pins::FindPaths(n + 1, PlanJoints(scene.mechanism())).front())
             .value();
-    pins::TwoHandle<double> all;
-    TwoHandles printed;
-    double rcond = 1.0;
+    RealMatrix forces(2, 3);  // in ground axes
+    forces << 0, 1, 0, 0, 0, 1;
+    std::vector<Link<2>> links;
     for (int k = 1; k < n; ++k) {
-      const pins::PathBody& at = links.path[k];
-      const pins::Link<double>& link = links.links[k];
+      const pins::PathBody& at = path.path[k];
+      const pins::Link<double>& link = path.links[k];
       ASSERT_GT(link.mobility, 0.0) << "not pinned by a joint of the tree";
-      const double angle = scene.kinematics().poses()[at.body].angle + links.axes[k];
-      const double speed = scene.kinematics().motions()[at.body].angular[0];
-      const auto leaf = pins::Leaf<Unknowns::kAccelerations>(link, pins::Turn(link, angle), speed);
-      const int after = k + 1 < n ? links.path[k + 1].before : at.ground;
-      const TwoHandles body = scene.Body(at.body, at.before, after);
-      tally.Hold("leaf", Difference(leaf, body), kMargin * kEps);
-      if (k == 1) {
-        all = leaf;
-        printed = body;
-        continue;
-      }
-      pins::Cut<double> cut;
-      double slack = 0.0;
-      const auto joined = pins::Join(all, leaf, 0.0, cut, slack);
-      const Cut joint = scene.JointTo(at.body, at.before);
-      const SeriesJoin join(printed, body, joint);
-      rcond = std::min(rcond, Rcond(join.X));
-      const double bound = kMargin * n * kEps / rcond;
-      const pins::Vector2<double> F1 = {0.3, -0.7}, F2 = {1.1, 0.4};
-      RealVector F_k = RealVector::Zero(3), F_k1 = F_k;
-      F_k.tail(2) = ToReal(F1);
-      F_k1.tail(2) = ToReal(F2);
-      Deviation force;
-      force.Note(ToReal(pins::ForceIn(cut, F1, F2)),
-                 MeasureNumbers(printed, body, joint, join, F_k, F_k1));
-      tally.Hold("force", force, bound);
-      all = joined;
-      printed = Assemble(printed, body, join);
-      tally.Hold("Upsilon", Difference(all, printed), bound);
-      ++tally.assemblies;
+      const auto turned =
+          pins::Turn(link, scene.kinematics().poses()[at.body].angle + path.axes[k]);
+      const auto leaf =
+          Handles(pins::ResponseOf(link, turned),
+                  pins::FreeMotion<Unknowns::kAccelerations>(
+                      link, turned, scene.kinematics().motions()[at.body].angular[0]));
+      const int after = k + 1 < n ? path.path[k + 1].before : at.ground;
+      links.push_back({at.body, at.before, after, forces, forces, leaf, leaf});
     }
+    HoldChain(
+        scene, links, RealVector::Zero(3), [](int, auto&) {}, 1, n, tally);
     ++tally.scenes;
   }
   tally.Print("plane, kernels for pins");
@@ -103,19 +142,6 @@ RealMatrix OnHandle(const Rotation<Spatial, double>& R) {
   for (int i = 0; i < arms::kRows; ++i) rows.row(i) = all.row(kComponent[i]);
   return rows;
 }
-RealMatrix ToReal(const arms::Symmetric<double, arms::kRows>& A) {
-  RealMatrix real(arms::kRows, arms::kRows);
-  for (int i = 0; i < arms::kRows; ++i) {
-    for (int j = 0; j <= i; ++j) real(i, j) = real(j, i) = A(i, j);
-  }
-  return real;
-}
-RealMatrix Column(const double* numbers) {
-  RealMatrix column(arms::kRows, 1);
-  for (int i = 0; i < arms::kRows; ++i) column(i, 0) = numbers[i];
-  return column;
-}
-
 /// A body of an arm and its place among others: rows on the D of both handles.
 struct ArmPlace {
   arms::ArmBody constants;
@@ -158,74 +184,7 @@ arms::Free<double> FreeOf(const Scene<Spatial>& scene, const ArmPlace& at, doubl
   return free;
 }
 
-/// Kernels take gravity from all accelerations.
-Deviation Difference(const arms::Piece<double>& kernel, const TwoHandles& printed,
-                     const RealMatrix& on_1, const RealMatrix& on_2, const RealVector& gravity) {
-  RealMatrix z12(arms::kRows, arms::kRows);
-  for (int i = 0; i < arms::kRows; ++i) {
-    for (int j = 0; j < arms::kRows; ++j) z12(i, j) = kernel.response.zeta12[i][j];
-  }
-  Deviation deviation;
-  deviation.Note(ToReal(kernel.response.zeta11), on_1 * printed.z11 * on_1.transpose());
-  deviation.Note(ToReal(kernel.response.zeta22), on_2 * printed.z22 * on_2.transpose());
-  deviation.Note(z12, on_1 * printed.z12 * on_2.transpose());
-  deviation.Note(Column(kernel.zeta13), on_1 * (printed.z13 - gravity));
-  deviation.Note(Column(kernel.zeta23), on_2 * (printed.z23 - gravity));
-  return deviation;
-}
-
-/// The inner bodies of an arm joined one after another.
-void HoldArm(const Scene<Spatial>& scene, const arms::Arm& arm, int n, Tally& tally) {
-  RealVector gravity = RealVector::Zero(6);
-  for (int i = 0; i < 3; ++i) gravity[3 + i] = scene.mechanism().gravity()[i];
-  arms::Piece<double> piece;
-  TwoHandles printed;
-  RealMatrix on_first;
-  double rcond = 1.0;
-  for (const ArmPlace& at : InnerBodies(scene, arm)) {
-    const arms::Link<double>& link = at.constants.link;
-    const arms::Free<double> alone = FreeOf(scene, at, 0.0);
-    arms::Piece<double> leaf;
-    leaf.response = link.response;
-    std::copy_n(alone.zeta13, arms::kRows, leaf.zeta13);
-    std::copy_n(alone.zeta23, arms::kRows, leaf.zeta23);
-    const TwoHandles body = scene.Body(at.body, at.joint, at.after);
-    // axes of joint sides are products of up to n rotations
-    tally.Hold("leaf", Difference(leaf, body, at.on_1, at.on_2, gravity), kMargin * n * kEps);
-    if (on_first.size() == 0) {
-      piece = leaf;
-      printed = body;
-      on_first = at.on_1;
-      continue;
-    }
-    const double sign = at.constants.sign, angle = sign * scene.coordinate(at.constants.u);
-    const arms::Free<double> free = FreeOf(scene, at, sign * scene.speed(at.constants.u));
-    arms::Cut<double> cut;
-    double slack = 0.0;
-    Join(piece, arms::Turn<double>{std::cos(angle), std::sin(angle)}, link.response, free, cut,
-         slack);
-    EXPECT_EQ(slack, 0.0);
-    const Cut joint = scene.JointTo(at.body, at.joint);
-    const SeriesJoin join(printed, body, joint);
-    rcond = std::min(rcond, Rcond(join.X));
-    const double bound = kMargin * n * kEps / rcond;
-    const double F1[] = {0.3, -0.7, 0.2, 1.1, -0.4}, F2[] = {1.1, 0.4, -0.9, 0.1, 0.6};
-    double force[arms::kRows];
-    ForceIn(cut, link.response.zeta12, F1, F2, force);
-    const RealVector f =
-        joint.D * MeasureNumbers(printed, body, joint, join, on_first.transpose() * Column(F1),
-                                 at.on_2.transpose() * Column(F2));
-    Deviation deviation;
-    deviation.Note(Column(force), at.on_1 * f);
-    tally.Hold("force", deviation, bound);
-    printed = Assemble(printed, body, join);
-    tally.Hold("Upsilon", Difference(piece, printed, on_first, at.on_2, gravity), bound);
-    ++tally.assemblies;
-  }
-}
-
-/// Free bodies of chains of revolute joints in space, by the kernels of revolute_handles.h: leaves
-/// (1-4), and joins of one after another (15-17), (26-30).
+/// Free bodies of chains of revolute joints in space, by the kernels of handles.h and revolutes.h.
 TEST(PaperTest, RevoluteKernelsAreThePrintedFormulas) {
   constexpr int n = 9;
   Tally tally;
@@ -234,8 +193,24 @@ TEST(PaperTest, RevoluteKernelsAreThePrintedFormulas) {
     MechanismDescription chain = ChainOf(std::vector(n + 1, JointType::kRevolute), b);
     chain.forces.clear();
     const Scene<Spatial> scene(chain, seed);
+    RealVector gravity = RealVector::Zero(6);
+    for (int i = 0; i < 3; ++i) gravity[3 + i] = scene.mechanism().gravity()[i];
     for (const arms::Arm& arm : arms::FindArms(scene.mechanism()).arms) {
-      HoldArm(scene, arm, n, tally);
+      const std::vector<ArmPlace> places = InnerBodies(scene, arm);
+      std::vector<Link<arms::kRows>> links;
+      for (const ArmPlace& at : places) {
+        const auto& response = at.constants.link.response;
+        const double speed = at.constants.sign * scene.speed(at.constants.u);
+        links.push_back({at.body, at.joint, at.after, at.on_1, at.on_2,
+                         Handles(response, FreeOf(scene, at, 0.0)),
+                         Handles(response, FreeOf(scene, at, speed))});
+      }
+      const auto turn = [&](int k, TwoHandle<double, arms::kRows>& all) {
+        const arms::ArmBody& body = places[k].constants;
+        const double angle = body.sign * scene.coordinate(body.u);
+        arms::TurnHandle(arms::Turn<double>{std::cos(angle), std::sin(angle)}, all);
+      };
+      HoldChain(scene, links, gravity, turn, n, n, tally);
     }
     ++tally.scenes;
   }
@@ -243,5 +218,4 @@ TEST(PaperTest, RevoluteKernelsAreThePrintedFormulas) {
   EXPECT_GE(tally.assemblies, 5 * tally.scenes);
 }
 
-}  // namespace paper_kernels_test
-}  // namespace loopbench::odca::paper
+}  // namespace loopbench::odca::paper::paper_kernels_test

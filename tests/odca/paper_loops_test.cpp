@@ -1,17 +1,9 @@
 // The paper's formulas for loops that share a body, (43-72), evaluated as printed on figure 4 with
 // joints of every kind: against O-DCA, and against a dense system of the lower loop, which shows a
 // misprint in (72).
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <string>
-#include <utility>
-#include <vector>
-
 #include "tests/odca/paper_series.h"
 
-namespace loopbench::odca::paper {
-namespace paper_loops_test {
+namespace loopbench::odca::paper::paper_loops_test {
 
 /// Figure 4: Ground, 1, 2, 3, Ground are the upper loop, 2, 4, 5, 6, 2 the lower one. Body 2 has
 /// its handle 2+ where the joints to 1 and 4 are, 2- where those to 3 and 6 are; it is Q of all
@@ -202,5 +194,4 @@ TEST(PaperTest, Equation72LacksAFactorInPrint) {
   EXPECT_LE(3 * tally.left_out, tally.scenes);
 }
 
-}  // namespace paper_loops_test
-}  // namespace loopbench::odca::paper
+}  // namespace loopbench::odca::paper::paper_loops_test

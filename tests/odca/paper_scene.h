@@ -1,15 +1,12 @@
 // A random mechanism in the paper's terms: two-handle bodies, joints, and what O-DCA found.
 #pragma once
 
-#include <optional>
-#include <span>
-#include <vector>
-
 #include "mechanism/loops/tree_dynamics.h"
 #include "odca/odca.h"
 #include "tests/contract/generators.h"
 #include "tests/contract/system_with.h"
 #include "tests/odca/paper_formulas.h"
+#include "tests/standard.h"
 
 namespace loopbench::odca::paper {
 

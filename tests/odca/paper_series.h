@@ -2,14 +2,6 @@
 // chains and of coupled loops.
 #pragma once
 
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <cstdio>
-#include <limits>
-#include <utility>
-#include <vector>
-
 #include "tests/contract/builder.h"
 #include "tests/odca/paper_scene.h"
 
@@ -22,7 +14,6 @@ using testing::Real;
 /// it by its condition. Sums within one join have d = 6 terms of random sign, some sqrt(6) eps
 /// each, and three products follow one another: 10. The largest deviation seen is 2.
 inline constexpr double kMargin = 10.0;
-inline constexpr double kEps = std::numeric_limits<double>::epsilon();
 inline constexpr Real kRealEps = std::numeric_limits<Real>::epsilon();
 
 /// Smallest over largest eigenvalue of what the formulas invert.

@@ -1,15 +1,9 @@
 // The paper's formulas for one loop, (15-42), evaluated as printed, against a dense system of the
 // same bodies and against O-DCA: random chains closed on Ground through joints of every kind.
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <vector>
-
 #include "mechanism/description/library.h"
 #include "tests/odca/paper_series.h"
 
-namespace loopbench::odca::paper {
-namespace paper_test {
+namespace loopbench::odca::paper::paper_test {
 
 MechanismDescription ChainOfKinds(int n, SpaceKind space, std::uint64_t seed) {
   Builder b("paper-chain", space, seed);
@@ -168,5 +162,4 @@ TEST(PaperTest, ChiOfAPlanarLoopInSpaceIsNotPositiveDefinite) {
   EXPECT_GE(eigenvalues[3], 1e-4L * largest);
 }
 
-}  // namespace paper_test
-}  // namespace loopbench::odca::paper
+}  // namespace loopbench::odca::paper::paper_test

@@ -1,14 +1,8 @@
 // Paths side by side against each of them alone: the same bits, whoever is in the other lanes.
-#include <gtest/gtest.h>
-
-#include <limits>
-
 #include "mechanism/description/library.h"
-#include "tests/contract/allocations.h"
 #include "tests/odca/served.h"
 
-namespace loopbench::odca::pins {
-namespace path_lane_test {
+namespace loopbench::odca::pins::path_lane_test {
 
 /// As many numbers for each lane.
 std::vector<Lanes> Lane(const std::vector<Numbers>& of_lanes) {
@@ -149,5 +143,4 @@ TEST_P(PathLaneTest, ServesSolversOfRunsSideBySide) {
   EXPECT_EQ(testing::CountAllocations(), before);
 }
 
-}  // namespace path_lane_test
-}  // namespace loopbench::odca::pins
+}  // namespace loopbench::odca::pins::path_lane_test

@@ -1,20 +1,9 @@
 // The sweep along paths against the general one, which the contract suite holds to an oracle.
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <cstdio>
-#include <limits>
-#include <numbers>
-#include <numeric>
-
 #include "mechanism/description/library.h"
 #include "odca/path_links.h"
 #include "tests/odca/served.h"
 
-namespace loopbench::odca::pins {
-namespace path_sweep_test {
-
-constexpr double kEps = std::numeric_limits<double>::epsilon();
+namespace loopbench::odca::pins::path_sweep_test {
 
 Both Compare(const Mechanism<Planar, double>& mechanism, SpeedsUsed speeds, const Numbers& q,
              const Numbers& u, int bodies_of_group = kBodiesOfGroup) {
@@ -146,29 +135,6 @@ TEST(PathSweep, LeavesWhatIsRegularizedToTheGeneralSweep) {
   }
 }
 
-TEST(TwoHandleKernels, TakeAsManyOperationsAsTheySay) {
-  Link<Counted> link;
-  TurnedLink<Counted> at;
-  TwoHandle<Counted> A, B;
-  OneHandle<Counted> end;
-  Cut<Counted> cut;
-  EndCut<Counted> end_cut;
-  Vector2<Counted> F;
-  Counted speed, slack;
-  EXPECT_EQ(ProductsOf([&] { Leaf<Unknowns::kAccelerations>(link, at, speed); }),
-            Operations::Leaf(Unknowns::kAccelerations));
-  EXPECT_EQ(ProductsOf([&] { Leaf<Unknowns::kSpeeds>(link, at, speed); }),
-            Operations::Leaf(Unknowns::kSpeeds));
-  EXPECT_EQ(ProductsOf([&] { Leaf<Unknowns::kCompleted>(link, at, speed); }),
-            Operations::Leaf(Unknowns::kCompleted));
-  EXPECT_EQ(ProductsOf([&] { Join(A, B, Counted(0.0), cut, slack); }), Operations::kJoin);
-  EXPECT_EQ(ProductsOf([&] { Join(end, B, Counted(0.0), end_cut, slack); }), Operations::kEndJoin);
-  EXPECT_EQ(ProductsOf([&] { ForceIn(cut, F, F); }), Operations::kForceIn);
-  EXPECT_EQ(ProductsOf([&] { ForceIn(end_cut, F); }), Operations::kForceInEnd);
-  EXPECT_EQ(ProductsOf([&] { AngularAcceleration<Unknowns::kCompleted>(at, F, F); }),
-            Operations::kAngularAcceleration);
-}
-
 TEST(Paths, AreFoundInAnyOrderOfJoints) {
   using Joints = std::vector<PlanJoint>;
   const auto bodies = [](int n, const Joints& joints) {
@@ -188,5 +154,4 @@ TEST(Paths, AreFoundInAnyOrderOfJoints) {
   EXPECT_EQ(bodies(4, Joints{{0, 1, 2, 2}, {1, 1, 3, 2}, {2, 1, 4, 2}}), Found{}) << "a hub";
 }
 
-}  // namespace path_sweep_test
-}  // namespace loopbench::odca::pins
+}  // namespace loopbench::odca::pins::path_sweep_test

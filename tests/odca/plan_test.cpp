@@ -2,21 +2,13 @@
 // change the order of the work but not the result.
 #include "odca/plan.h"
 
-#include <gtest/gtest.h>
-
-#include <cmath>
-#include <functional>
-#include <numeric>
-#include <set>
-
 #include "mechanism/description/library.h"
 #include "odca/join_order.h"
 #include "odca/odca.h"
 #include "tests/contract/comparison.h"
 #include "tests/contract/system_with.h"
 
-namespace loopbench::odca {
-namespace plan_test {
+namespace loopbench::odca::plan_test {
 
 using testing::ConsistentState;
 using testing::RelativeError;
@@ -447,5 +439,4 @@ TEST(PlanTest, EveryOptionGivesTheSameAccelerations) {
   }
 }
 
-}  // namespace plan_test
-}  // namespace loopbench::odca
+}  // namespace loopbench::odca::plan_test

@@ -1,12 +1,6 @@
 // Mechanisms that short cuts of right-hand sides serve, and what tests need to know of each.
 #pragma once
 
-#include <algorithm>
-#include <numbers>
-#include <string>
-#include <utility>
-#include <vector>
-
 #include "tests/contract/builder.h"
 #include "tests/odca/short_cut.h"
 
@@ -17,9 +11,7 @@ using testing::Random;
 
 inline JointDescription Pin(Random& random, int from, int to) {
   const auto side = [&](int body) {
-    return JointSide{body,
-                     random.Vector(1.0, false),
-                     {0.0, 0.0, random.Uniform(-std::numbers::pi, std::numbers::pi)}};
+    return JointSide{body, random.Vector(1.0, false), {0.0, 0.0, random.Uniform(-kPi, kPi)}};
   };
   JointDescription pin;
   pin.from = side(from);

@@ -1,17 +1,11 @@
 // Short cuts of right-hand sides held against the general sweep.
 #pragma once
 
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <cstdio>
-#include <limits>
-#include <span>
-
 #include "odca/odca.h"
 #include "tests/contract/allocations.h"
 #include "tests/contract/builder.h"
 #include "tests/contract/system_with.h"
+#include "tests/standard.h"
 
 namespace loopbench::odca {
 
@@ -31,9 +25,7 @@ inline Numbers RandomNumbers(testing::Random& random, int n, double size) {
 }
 
 /// The contract's bound: sums along n bodies, magnified by the condition of what is inverted.
-inline double Bound(int n, double rcond) {
-  return 100.0 * std::numeric_limits<double>::epsilon() * n / rcond;
-}
+inline double Bound(int n, double rcond) { return 100.0 * kEps * n / rcond; }
 
 /// Results of the fast path and of the general sweep for a state at a level with these speeds.
 struct Both {

@@ -1,19 +1,11 @@
 // What every short cut of right-hand sides must do, whatever it serves.
-#include <gtest/gtest.h>
-
-#include <cmath>
-#include <cstdio>
-#include <limits>
-#include <optional>
-
 #include "lagrange/lagrange.h"
+#include "odca/pins.h"
+#include "odca/revolutes.h"
 #include "tests/contract/allocations.h"
 #include "tests/odca/served.h"
 
-namespace loopbench::odca {
-namespace short_cut_test {
-
-constexpr double kEps = std::numeric_limits<double>::epsilon();
+namespace loopbench::odca::short_cut_test {
 
 template <class Served>
 class ShortCutTest : public ::testing::Test {
@@ -335,5 +327,58 @@ TYPED_TEST(ShortCutTest, AllocatesNothing) {
   }
 }
 
-}  // namespace short_cut_test
-}  // namespace loopbench::odca
+/// Of joints with n rows, and of a last handle with k.
+template <int n, int k>
+void HoldOperations() {
+  Response<Counted, n> B;
+  Response<Counted, n, k> last;
+  InnerCut<Counted, n> cut;
+  EndCut<Counted, n, k> end_cut;
+  OneHandle<Counted, n> end;
+  TwoHandle<Counted, n> all;
+  Counted slack, F[k], force[n], zeta[k];
+  using Work = Operations<n>;
+  EXPECT_EQ(ProductsOf([&] { JoinSeries(all, B, zeta, zeta, Counted(0.0), cut, slack); }),
+            Work::kJoin);
+  EXPECT_EQ(ProductsOf([&] { JoinSeries(end, last, zeta, zeta, Counted(0.0), end_cut, slack); }),
+            Work::EndJoin(k));
+  EXPECT_EQ(ProductsOf([&] { ForceIn(cut, B, F, F, force); }), Work::kForceIn);
+  EXPECT_EQ(ProductsOf([&] { ForceIn(end_cut, F, force); }), Work::ForceInEnd(k));
+}
+
+TEST(HandleKernels, TakeAsManyOperationsAsTheySay) {
+  HoldOperations<pins::kRows, pins::kRows>();
+  HoldOperations<arms::kRows, arms::kRows>();
+  HoldOperations<arms::kRows, arms::kAll>();
+}
+
+TEST(PinKernels, TakeAsManyOperationsAsTheySay) {
+  pins::Link<Counted> link;
+  pins::TurnedLink<Counted> at;
+  Counted speed, F[pins::kRows];
+  const auto count = [&]<Unknowns unknowns>() {
+    EXPECT_EQ(ProductsOf([&] { pins::FreeMotion<unknowns>(link, at, speed); }),
+              pins::FreeMotionWork(unknowns));
+  };
+  count.operator()<Unknowns::kAccelerations>();
+  count.operator()<Unknowns::kSpeeds>();
+  count.operator()<Unknowns::kCompleted>();
+  EXPECT_EQ(ProductsOf([&] { pins::ResponseOf(link, at); }), pins::kResponseWork);
+  EXPECT_EQ(ProductsOf([&] { pins::AngularAcceleration<Unknowns::kCompleted>(at, F, F); }),
+            pins::kAngularAccelerationWork);
+}
+
+TEST(RevoluteKernels, TakeAsManyOperationsAsTheySay) {
+  using namespace arms;
+  OneHandle<Counted, kRows> one;
+  TwoHandle<Counted, kRows> two;
+  Turn<Counted> turn;
+  Counted free, F[kAll], row[kRows], all[kAll];
+  EXPECT_EQ(ProductsOf([&] { TurnHandle(turn, one); }), kTurnOneWork);
+  EXPECT_EQ(ProductsOf([&] { TurnHandle(turn, two); }), kTurnTwoWork);
+  EXPECT_EQ(ProductsOf([&] { About(free, row, row, F, F); }), AboutWork(kRows));
+  EXPECT_EQ(ProductsOf([&] { About(free, row, all, F, F); }), AboutWork(kAll));
+  EXPECT_EQ(ProductsOf([&] { OppositeBefore(turn, F, F); }), kOppositeWork);
+}
+
+}  // namespace loopbench::odca::short_cut_test

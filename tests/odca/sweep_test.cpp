@@ -1,10 +1,6 @@
 // The sweep's size and cost, counted, and its round-off, measured with long double.
 #include "odca/sweep.h"
 
-#include <gtest/gtest.h>
-
-#include <limits>
-
 #include "mechanism/description/library.h"
 #include "mechanism/simplify/redundancy.h"
 #include "odca/odca.h"
@@ -13,8 +9,7 @@
 #include "tests/contract/comparison.h"
 #include "tests/contract/system_with.h"
 
-namespace loopbench::odca {
-namespace sweep_test {
+namespace loopbench::odca::sweep_test {
 
 /// Operations of one evaluation; any position will do.
 long Operations(const MechanismDescription& description, SolverKind solver) {
@@ -125,7 +120,7 @@ TEST(SweepTest, LongDoubleAgreesWithDouble) {
     const long double error =
         (udot - sample.udot(Coordinates::kJoint)).lpNorm<Eigen::Infinity>() / scale;
     // joint frames reach the mechanism in double, hence a few eps of double and not of long double
-    EXPECT_LE(error, 10.0L * n * std::numeric_limits<double>::epsilon() / sample.answer().rcond);
+    EXPECT_LE(error, 10.0L * n * kEps / sample.answer().rcond);
     testing::SystemWith<Odca, Planar, double> in_double(sample.mechanism(Coordinates::kJoint));
     VectorX<double> udot_double;
     in_double->Evaluate(0.0, state.q, state.u, udot_double);
@@ -134,5 +129,4 @@ TEST(SweepTest, LongDoubleAgreesWithDouble) {
 }
 #endif
 
-}  // namespace sweep_test
-}  // namespace loopbench::odca
+}  // namespace loopbench::odca::sweep_test

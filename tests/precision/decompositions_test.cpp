@@ -1,16 +1,9 @@
 // Singular values and vectors, eigenvalues and eigenvectors of symmetric matrices, in every scalar.
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <cmath>
-#include <limits>
-#include <random>
-#include <vector>
-
 #include "harness/precision/float128.h"
 #include "mechanism/algebra/singular_values.h"
 #include "mechanism/algebra/space.h"
 #include "mechanism/algebra/symmetric_eigen.h"
+#include "tests/standard.h"
 
 namespace loopbench {
 namespace {

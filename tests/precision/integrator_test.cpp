@@ -1,17 +1,12 @@
 // The one-step methods in every scalar: order, round-off, and ARKODE's steps in double.
 #include "harness/precision/integrator.h"
 
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <cmath>
-#include <limits>
-
 #include "harness/config/mechanism_reader.h"
 #include "harness/integrator/arkode.h"
 #include "harness/precision/scalars.h"
 #include "harness/run/run.h"
 #include "mechanism/start/assembly.h"
+#include "tests/standard.h"
 
 namespace loopbench::harness {
 namespace {

@@ -1,32 +1,22 @@
 // Mechanisms in every scalar: closed forms, levels, and which part of an error rules.
 #include "harness/precision/ladder.h"
 
-#include <gtest/gtest.h>
-
-#include <cmath>
-#include <limits>
-
-#include "harness/config/mechanism_reader.h"
 #include "harness/precision/exact.h"
 #include "harness/precision/integrator.h"
 #include "lagrange/lagrange.h"
 #include "mechanism/formulation/system.h"
 #include "odca/odca.h"
 #include "reduction/reduction.h"
+#include "tests/harness/places.h"
 #include "tests/precision/pendulum.h"
 
 namespace loopbench::harness {
 namespace {
 
-MechanismDescription Shipped(const std::string& name) {
-  return ReadMechanism(std::string(LOOPBENCH_SOURCE_DIR) + "/configs/mechanisms/" + name + ".json")
-      .description;
-}
-
 /// The cranks of the parallelogram move as a pendulum with w^2 = 2 g / 3.5: between two bars of
 /// I + m L^2 / 4 = 1.25 and the coupler, whose mass moves with their tips, 3.5 kg m^2 in all.
 TEST(ClosedFormTest, ParallelogramFollowsItsPendulumInFloat128) {
-  const MechanismDescription description = Shipped("parallelogram");
+  const MechanismDescription description = Shipped("parallelogram").description;
   Exact exact(description, Coordinates::kJoint);
   ASSERT_EQ(exact.outcome(), Outcome::kFinished) << exact.message();
   // loops close to a few roundings of lengths of a metre
@@ -56,7 +46,7 @@ TEST(ClosedFormTest, ParallelogramFollowsItsPendulumInFloat128) {
 LadderTask Task(const std::string& mechanism, const std::string& formulation,
                 Enforcement enforcement) {
   LadderTask task;
-  task.description = Shipped(mechanism);
+  task.description = Shipped(mechanism).description;
   task.method = {.formulation = formulation, .enforcement = enforcement};
   task.horizon = 1.0;
   task.precision.scalars = {Scalar::kFloat, Scalar::kDouble, Scalar::kLongDouble,
@@ -160,7 +150,7 @@ class Own final : public Level<Space, S> {
 TEST(LadderLevels, OfOtherProgramsAreRefusedByName) {
   const Enforcement own =
       RegisterLevel(LevelRowOf<Own>({.name = "own-in-double", .sentence = "as acceleration."}));
-  const MechanismDescription description = Shipped("four-bar");
+  const MechanismDescription description = Shipped("four-bar").description;
   const Mechanism<Planar, double> mechanism(description, Coordinates::kJoint);
   EXPECT_NO_THROW(MakeSystem<odca::Odca>(mechanism, {.enforcement = own}));
   try {

@@ -2,28 +2,14 @@
 // numbers.
 #include "harness/precision/make_reference.h"
 
-#include <gtest/gtest.h>
-
-#include <array>
-#include <cmath>
-#include <iostream>
-#include <limits>
-
-#include "harness/config/mechanism_reader.h"
 #include "harness/judge/analysis.h"
 #include "harness/precision/exact.h"
+#include "tests/harness/places.h"
 #include "tests/precision/pendulum.h"
 #include "tests/reference/published_numbers.h"
 
 namespace loopbench::harness {
 namespace {
-
-constexpr double kPi = std::numbers::pi;
-
-MechanismDescription Shipped(const std::string& name) {
-  return ReadMechanism(std::string(LOOPBENCH_SOURCE_DIR) + "/configs/mechanisms/" + name + ".json")
-      .description;
-}
 
 std::vector<double> Times(double horizon, int count) {
   std::vector<double> times;
@@ -84,7 +70,8 @@ template <class S>
 void CertificateIsRight(std::span<const Swinging> all, PutBack put_back, double digits) {
   for (const Swinging& swinging : all) {
     const std::vector<double> times = Times(swinging.horizon, 50);
-    const auto certified = Certify<Planar, S>(Shipped(swinging.name), times, 60.0, put_back);
+    const auto certified =
+        Certify<Planar, S>(Shipped(swinging.name).description, times, 60.0, put_back);
     ASSERT_EQ(certified.outcome, Outcome::kFinished) << certified.message;
     ASSERT_EQ(certified.bounds.size(), times.size());
     const Verdict verdict = Judge<S>(swinging, certified, times);
@@ -115,7 +102,7 @@ TEST(Certificate, IsRightThroughSingularPositionsInFloat128) {
 
 TEST(Certificate, EndsWhereWitnessesPart) {
   // with only five thousandths of a second of CPU time each witness is cut off on the way
-  const MechanismDescription chain = Shipped("general-seven-bar");
+  const MechanismDescription chain = Shipped("general-seven-bar").description;
   const Reference reference = MakeReference(chain, 10.0, LinkLength(chain), {.cpu_s = 5e-3});
   EXPECT_EQ(reference.outcome, "time-limit");
   EXPECT_LT(reference.trust_horizon, 10.0);
@@ -123,7 +110,7 @@ TEST(Certificate, EndsWhereWitnessesPart) {
 }
 
 TEST(Certificate, TakesTheWiderScalarWhereItMust) {
-  const MechanismDescription flat = Shipped("parallelogram-singular-start");
+  const MechanismDescription flat = Shipped("parallelogram-singular-start").description;
   const double length = LinkLength(flat);
   const Reference narrow =
       MakeReference(flat, 3.0, length, {.scalar = "long-double", .points = 31});
@@ -147,7 +134,7 @@ TEST(Certificate, TakesTheWiderScalarWhereItMust) {
 }
 
 TEST(Certificate, SaysWhyThereIsNone) {
-  const MechanismDescription bennett = Shipped("bennett");
+  const MechanismDescription bennett = Shipped("bennett").description;
   const Reference none = MakeReference(bennett, 1.0, 1.0, {.scalar = "float128"});
   EXPECT_EQ(none.outcome, "unsupported");
   EXPECT_EQ(none.message, "float128 is for planar mechanisms");
@@ -157,8 +144,9 @@ TEST(Certificate, SaysWhyThereIsNone) {
 
 TEST(Certificate, IsThatOfTheMechanismInItsPlaneAndInSpace) {
   // the same loop described in space: with its redundant constraints, without the plane's rotations
-  const Reference plane = MakeReference(Shipped("four-bar"), 2.0, 1.0, {.points = 21});
-  const Reference space = MakeReference(Shipped("four-bar-in-space"), 2.0, 1.0, {.points = 21});
+  const Reference plane = MakeReference(Shipped("four-bar").description, 2.0, 1.0, {.points = 21});
+  const Reference space =
+      MakeReference(Shipped("four-bar-in-space").description, 2.0, 1.0, {.points = 21});
   ASSERT_EQ(plane.snapshots.size(), space.snapshots.size());
   // bodies are the same, axes are others: energies are not
   const double first = space.snapshots.front().energy - plane.snapshots.front().energy;
@@ -192,7 +180,7 @@ struct End {
 };
 
 End ReferenceAt(const std::string& name, double t, WaysTried tried = WaysTried::kAll) {
-  End end{Shipped(name), {}};
+  End end{Shipped(name).description, {}};
   end.reference = MakeReference(end.user, t, LinkLength(end.user), {.points = 11}, tried);
   EXPECT_EQ(end.reference.outcome, "finished") << name << ": " << end.reference.message;
   EXPECT_EQ(end.reference.trust_horizon, t) << name;

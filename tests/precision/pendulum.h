@@ -1,9 +1,8 @@
 // The closed form of a pendulum in all digits of float128.
 #pragma once
 
-#include <numbers>
-
 #include "harness/precision/float128.h"
+#include "tests/standard.h"
 
 namespace loopbench::harness {
 

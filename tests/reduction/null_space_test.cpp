@@ -1,22 +1,15 @@
 // Accelerations by a basis of the free directions against the dense equations of multipliers.
 #include "reduction/null_space.h"
 
-#include <gtest/gtest.h>
-
-#include <limits>
-
 #include "mechanism/algebra/decompositions.h"
 #include "tests/contract/placed.h"
 #include "tests/mechanism/shipped.h"
 
-namespace loopbench::reduction {
-namespace null_space_test {
+namespace loopbench::reduction::null_space_test {
 
 using testing::Random;
 using testing::Shipped;
 using testing::State;
-
-constexpr double kEps = std::numeric_limits<double>::epsilon();
 
 VectorX<double> RandomVector(Eigen::Index size, std::uint64_t seed) {
   Random random(seed);
@@ -163,5 +156,4 @@ TEST(NullSpaceTest, DirectionsFadeOutWithoutAJump) {
   EXPECT_LT(before, 1e-6);
 }
 
-}  // namespace null_space_test
-}  // namespace loopbench::reduction
+}  // namespace loopbench::reduction::null_space_test

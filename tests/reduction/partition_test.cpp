@@ -1,20 +1,13 @@
 // Which speeds follow from which constraints: against all other choices, and against known ranks.
 #include "reduction/partition.h"
 
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <bit>
-#include <cmath>
-
 #include "mechanism/algebra/decompositions.h"
 #include "mechanism/description/transforms.h"
 #include "reduction/dense_reduction.h"
 #include "tests/contract/generators.h"
 #include "tests/mechanism/shipped.h"
 
-namespace loopbench::reduction {
-namespace partition_test {
+namespace loopbench::reduction::partition_test {
 
 using testing::Random;
 using testing::Shipped;
@@ -156,5 +149,4 @@ TEST(PartitionTest, ServesShortLinks) {
   }
 }
 
-}  // namespace partition_test
-}  // namespace loopbench::reduction
+}  // namespace loopbench::reduction::partition_test

@@ -1,23 +1,14 @@
 // Factors of random sparse matrices against dense products and solves.
 #include "reduction/sparse_lu.h"
 
-#include <gtest/gtest.h>
-
-#include <Eigen/LU>
-#include <algorithm>
-#include <cmath>
-#include <limits>
-
 #include "mechanism/algebra/factors.h"
 #include "tests/contract/placed.h"
+#include "tests/standard.h"
 
-namespace loopbench::reduction {
-namespace sparse_lu_test {
+namespace loopbench::reduction::sparse_lu_test {
 
 using testing::Random;
 using testing::RandomNumbers;
-
-constexpr double kEps = std::numeric_limits<double>::epsilon();
 
 /// A tall matrix with `per_column` entries in each column, by columns.
 struct Sample {
@@ -180,5 +171,4 @@ TEST(SparseLu, IsTheSameAfterOtherPivots) {
   EXPECT_GT(found - others, 20);
 }
 
-}  // namespace sparse_lu_test
-}  // namespace loopbench::reduction
+}  // namespace loopbench::reduction::sparse_lu_test

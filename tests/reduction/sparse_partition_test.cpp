@@ -2,30 +2,20 @@
 // suspicious positions.
 #include "reduction/sparse_partition.h"
 
-#include <gtest/gtest.h>
-
-#include <cmath>
-#include <cstdio>
-#include <limits>
-
 #include "harness/config/experiment_reader.h"
 #include "lagrange/lagrange.h"
-#include "mechanism/description/library.h"
 #include "reduction/reduction.h"
 #include "tests/contract/placed.h"
 #include "tests/contract/system_with.h"
 #include "tests/mechanism/shipped.h"
 
-namespace loopbench::reduction {
-namespace sparse_partition_test {
+namespace loopbench::reduction::sparse_partition_test {
 
 using testing::ConsistentState;
 using testing::LadderAt;
 using testing::Random;
 using testing::RandomNumbers;
 using testing::State;
-
-constexpr double kEps = std::numeric_limits<double>::epsilon();
 
 /// How many of the mechanisms given could be compared.
 struct Tally {
@@ -338,5 +328,4 @@ TEST(Reduction, IsRightForTenThousandWindows) {
   EXPECT_GT(std::abs(most), 1.0);
 }
 
-}  // namespace sparse_partition_test
-}  // namespace loopbench::reduction
+}  // namespace loopbench::reduction::sparse_partition_test

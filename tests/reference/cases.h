@@ -2,21 +2,7 @@
 // them, and mechanisms made in code.
 #pragma once
 
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <array>
-#include <cctype>
-#include <filesystem>
-#include <ostream>
-#include <stdexcept>
-#include <string>
-#include <string_view>
-#include <tuple>
-#include <vector>
-
 #include "harness/config/experiment_reader.h"
-#include "harness/config/mechanism_reader.h"
 #include "harness/run/run.h"
 #include "tests/harness/places.h"
 
@@ -129,24 +115,12 @@ inline Case CaseOf(const Experiment& experiment, const std::string& problem, con
   return one;
 }
 
-/// A mechanism of configs/mechanisms/.
-inline MechanismFile Shipped(const std::string& name) {
-  return ReadMechanism(kConfigs / "mechanisms" / (name + ".json"));
-}
+using harness::Shipped;
+using harness::ShippedNames;
 
 /// A mechanism of configs/experiments/overconstrained/.
 inline MechanismFile Overconstrained(const std::string& name) {
   return ReadMechanism(kConfigs / "experiments/overconstrained" / (name + ".json"));
-}
-
-/// Names of the shipped mechanisms.
-inline std::vector<std::string> ShippedNames() {
-  std::vector<std::string> names;
-  for (const auto& entry : std::filesystem::directory_iterator(kConfigs / "mechanisms")) {
-    if (entry.path().extension() == ".json") names.push_back(entry.path().stem().string());
-  }
-  std::ranges::sort(names);
-  return names;
 }
 
 /// Whether a record says anything under a key.

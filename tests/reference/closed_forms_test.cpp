@@ -1,18 +1,11 @@
 // Whole simulations against motions known in closed form, and against published numbers: every
 // formulation at the level of the paper, in both coordinate sets, as published and rank-revealing.
-#include <gtest/gtest.h>
-
-#include <cmath>
-#include <numbers>
-
 #include "mechanism/description/library.h"
 #include "tests/reference/cases.h"
 #include "tests/reference/published_numbers.h"
 
-namespace loopbench::harness::reference {
-namespace closed_forms_test {
+namespace loopbench::harness::reference::closed_forms_test {
 
-constexpr double kPi = std::numbers::pi;
 constexpr double kGravity = 9.81;
 constexpr double kTolerance = 1e-11;  // rtol = atol of every run here
 
@@ -141,5 +134,4 @@ INSTANTIATE_TEST_SUITE_P(Methods, LongLadder,
                                          Published("reduction", Coordinates::kJoint)),
                          NameOfParam());
 
-}  // namespace closed_forms_test
-}  // namespace loopbench::harness::reference
+}  // namespace loopbench::harness::reference::closed_forms_test

@@ -1,19 +1,13 @@
 // Couplings over whole runs: energy, turns without end, drift by level.
-#include <fmt/format.h>
-#include <gtest/gtest.h>
-
-#include <cmath>
-#include <numbers>
-
+#include "harness/judge/analysis.h"
 #include "mechanism/description/library.h"
 #include "mechanism/description/transforms.h"
 #include "tests/reference/cases.h"
 #include "tests/reference/simulate.h"
 
-namespace loopbench::harness::reference {
-namespace couplings_test {
+namespace loopbench::harness::reference::couplings_test {
 
-constexpr double kTurn = 2 * std::numbers::pi;
+constexpr double kTurn = 2 * kPi;
 
 TEST(Couplings, ConserveEnergyFor100Seconds) {
   const MechanismDescription description = Shipped("geared-five-bar").description;
@@ -145,7 +139,7 @@ MechanismFile CardanCircles(const std::string& motion) {
   const std::string solution = fmt::format(
       R"("closed_form": {{"type": "pendulum", "body": "crank", "down_angle": {:.17g},
                         "frequency_squared": {:.17g}}},)",
-      -std::numbers::pi / 2, 9.81 * 0.65 / (0.05 + 0.0625 + 0.8 * 0.25 + 0.04));
+      -kPi / 2, 9.81 * 0.65 / (0.05 + 0.0625 + 0.8 * 0.25 + 0.04));
   return ParseMechanism(fmt::format(R"({{
     "name": "cardan-circles", "space": "planar", "gravity": [0, -9.81],
     "bodies": [{{"name": "crank", "mass": 1, "inertia": 0.05, "com": [0.25, 0],
@@ -193,57 +187,59 @@ TEST(Couplings, ThatFollowFromLoopsKeepTheBranchAtSingularPositions) {
 /// Two parallelograms one after the other, each flat where the other is not, and a coupling of the
 /// first crank with the last one: rows move between the loops. The middle crank has two arms.
 TEST(Couplings, ThatFollowFromTwoLoopsLetRowsMoveBetweenThem) {
-  const MechanismFile file = ParseMechanism(R"({
-    "name": "two-parallelograms", "space": "planar", "gravity": [0, 0],
-    "ground": {"points": {"C": [1, 0], "E": [2, 0]}},
-    "bodies": [
-      {"name": "first", "mass": 1, "inertia": 0.05, "points": {"A": [0.4, 0]}},
-      {"name": "middle", "mass": 1, "inertia": 0.05, "points": {"A": [0.4, 0], "B": [0, 0.4]}},
-      {"name": "last", "mass": 1, "inertia": 0.05, "points": {"B": [0, 0.4]}},
-      {"name": "rod1", "mass": 1.5, "inertia": 0.1, "points": {"A": [1, 0]}},
-      {"name": "rod2", "mass": 2, "inertia": 0.1, "points": {"B": [1, 0]}}],
-    "joints": [
-      {"name": "O", "type": "revolute", "from": {"body": "ground"}, "to": {"body": "first"}},
-      {"name": "C", "type": "revolute", "from": {"body": "ground", "at": "C"},
-       "to": {"body": "middle"}},
-      {"name": "E", "type": "revolute", "from": {"body": "ground", "at": "E"},
-       "to": {"body": "last"}},
-      {"name": "P", "type": "revolute", "from": {"body": "first", "at": "A"},
-       "to": {"body": "rod1"}},
-      {"name": "Q", "type": "revolute", "from": {"body": "middle", "at": "B"},
-       "to": {"body": "rod2"}},
-      {"name": "X", "type": "revolute", "from": {"body": "rod1", "at": "A"},
-       "to": {"body": "middle", "at": "A"}},
-      {"name": "Y", "type": "revolute", "from": {"body": "rod2", "at": "B"},
-       "to": {"body": "last", "at": "B"}}],
-    "couplings": [{"name": "shaft", "coefficients": {"O": 1, "E": -1}}],
-    "initial": {"coordinates": {"O": 0.7, "C": 0.7, "E": 0.7, "P": -0.7, "Q": -0.7},
-                "speeds": {"O": 9}},
-    "known_solution": {"branch": [{"first": 1, "middle": -1}, {"rod1": 1}, {"rod2": 1}],
-                       "length": 1}})",
-                                            "two-parallelograms.json");
+  const MechanismFile file =
+      ParseMechanism(TestData("two-parallelograms.json"), "two-parallelograms.json");
   constexpr double kTolerance = 1e-9;
   ExpectRegular(file, kTolerance, [](const Record& record) {
     EXPECT_LT(record.Number("energy_error_relative"), 1e3 * kTolerance);
   });
 }
 
+// A planet on the coupler of a parallelogram, and one on each end of it: without gravity all speeds
+// are constant, S = 2 O. Rows of couplings follow from the loop or from each other.
+TEST(Couplings, PlanetsOnAClosedLoopTurnTheirSunsTwiceAsFast) {
+  for (const char* extra : {"", R"(, {"name": "again", "coefficients": {"S": 1, "O": -1, "B": 1}})",
+                            R"(, {"name": "suns", "coefficients": {"S": 1, "S2": -1}})"}) {
+    const MechanismFile file = ParseMechanism(fmt::format(R"({{
+  "name": "planets", "space": "planar", "gravity": [0, 0],
+  "bodies": [{{"name": "crank", "mass": 1, "inertia": 0.1, "com": [0.5, 0]}},
+             {{"name": "rod", "mass": 1, "inertia": 0.4, "com": [1, 0]}},
+             {{"name": "rocker", "mass": 1, "inertia": 0.1, "com": [0.5, 0]}},
+             {{"name": "sun", "mass": 1, "inertia": 0.2}}, {{"name": "sun2", "mass": 1, "inertia": 0.2}}],
+  "joints": [
+    {{"name": "O", "type": "revolute", "from": {{"body": "ground"}}, "to": {{"body": "crank"}}}},
+    {{"name": "B", "type": "revolute", "from": {{"body": "crank", "at": [1, 0]}}, "to": {{"body": "rod"}}}},
+    {{"name": "D", "type": "revolute", "from": {{"body": "rod", "at": [2, 0]}},
+      "to": {{"body": "rocker", "at": [1, 0]}}}},
+    {{"name": "C", "type": "revolute", "from": {{"body": "ground", "at": [2, 0]}}, "to": {{"body": "rocker"}}}},
+    {{"name": "S", "type": "revolute", "from": {{"body": "ground"}}, "to": {{"body": "sun"}}}},
+    {{"name": "S2", "type": "revolute", "from": {{"body": "ground", "at": [2, 0]}}, "to": {{"body": "sun2"}}}}],
+  "couplings": [
+    {{"name": "planet", "coefficients": {{"S": 20, "O": -20, "B": 20}}}},
+    {{"name": "planet2", "coefficients": {{"S2": 20, "C": -20, "D": -20}}}}{}],
+  "initial": {{"coordinates": {{"O": 0.7, "B": -0.7, "C": 0.7, "D": 0.7, "S": 1.4, "S2": 1.4}},
+              "fixed": ["O"], "speeds": {{"O": 2.0}}}}}})",
+                                                          extra),
+                                              "planets.json");
+    const double t = 4.0;  // the loop is flat at 1.2 s and 2.8 s
+    for (const Method& method : MethodsAt({Enforcement::kVelocity, Enforcement::kPosition})) {
+      const Record record = RunFile(file, method, 1e-9, t);
+      const double missed = std::hypot(
+          std::remainder(record.Numbers("series.final.sun").back() - 1.4 - 4 * t, kTurn),
+          std::remainder(record.Numbers("series.final.sun2").back() - 1.4 - 4 * t, kTurn));
+      if (method.enforcement == Enforcement::kPosition) {
+        EXPECT_EQ(record.Text("outcome"), "finished") << ToString(method) << extra;
+        EXPECT_LE(missed, 1e-5) << ToString(method) << extra;
+      } else if (record.Text("outcome") == "finished" && !(missed <= 1e-5)) {
+        EXPECT_FALSE(OwnWarnings(record).empty()) << ToString(method) << extra << missed;
+      }
+    }
+  }
+}
+
 /// A rotor on a screw that closes a loop. Its effort is a moment; the thread carries the force.
 TEST(Couplings, RotorsOfScrewsKeepTheEnergyBalance) {
-  const MechanismFile file = ParseMechanism(R"({
-    "name": "screw", "space": "spatial", "gravity": [0, 0, 0],
-    "bodies": [{"name": "A", "mass": 1, "inertia": [0.02, 0.03, 0.025]},
-               {"name": "C", "mass": 1.2, "inertia": [0.02, 0.03, 0.025]},
-               {"name": "B", "mass": 0.9, "inertia": [0.02, 0.03, 0.025]}],
-    "joints": [
-      {"name": "J1", "type": "prismatic", "from": {"body": "ground"}, "to": {"body": "A"},
-       "axis": [0, 0, 1], "motion": {"type": "harmonic", "amplitude": 0.2, "omega": 3.0}},
-      {"name": "J2", "type": "planar", "from": {"body": "A"}, "to": {"body": "C"}},
-      {"name": "J3", "type": "universal", "from": {"body": "C"}, "to": {"body": "B"}},
-      {"name": "J4", "type": "helical", "pitch": 0.3, "from": {"body": "ground"},
-       "to": {"body": "B"}, "axis": [0, 0, 1], "cut": true, "rotor_inertia": 0.05}],
-    "initial": {"coordinates": {}}})",
-                                            "screw.json");
+  const MechanismFile file = ParseMechanism(TestData("screw.json"), "screw.json");
   for (const Method& method : PositionMethods()) {
     const Record record = RunFile(file, method, 1e-9, 2.0);
     ASSERT_EQ(record.Text("outcome"), "finished") << ToString(method) << record.Text("message");
@@ -252,5 +248,4 @@ TEST(Couplings, RotorsOfScrewsKeepTheEnergyBalance) {
   }
 }
 
-}  // namespace couplings_test
-}  // namespace loopbench::harness::reference
+}  // namespace loopbench::harness::reference::couplings_test

@@ -1,20 +1,12 @@
 // Prescribed motions through singular configurations: branches by closed forms, and the endings
 // where no branch is determined.
-#include <gtest/gtest.h>
-
-#include <cmath>
-#include <functional>
-#include <numbers>
-
 #include "mechanism/description/library.h"
 #include "mechanism/description/transforms.h"
 #include "tests/reference/cases.h"
 #include "tests/reference/simulate.h"
 
-namespace loopbench::harness::reference {
-namespace driven_passages_test {
+namespace loopbench::harness::reference::driven_passages_test {
 
-constexpr double kPi = std::numbers::pi;
 const Eigen::Vector3d kZero = Eigen::Vector3d::Zero();
 
 /// A mechanism with the exact angles of some of its bodies.
@@ -238,5 +230,4 @@ TEST(DrivenPassageBelowPosition, IsRightOrNamed) {
   EXPECT_GT(named, 0) << "nothing was tested";
 }
 
-}  // namespace driven_passages_test
-}  // namespace loopbench::harness::reference
+}  // namespace loopbench::harness::reference::driven_passages_test

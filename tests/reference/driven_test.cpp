@@ -1,9 +1,4 @@
 // Prescribed motions: what is known of driven mechanisms beforehand, and motions that cannot be.
-#include <gtest/gtest.h>
-
-#include <array>
-#include <cmath>
-
 #include "mechanism/description/library.h"
 #include "mechanism/formulation/system.h"
 #include "mechanism/simplify/redundancy.h"
@@ -12,8 +7,7 @@
 #include "tests/reference/cases.h"
 #include "tests/reference/simulate.h"
 
-namespace loopbench::harness::reference {
-namespace driven_test {
+namespace loopbench::harness::reference::driven_test {
 
 constexpr double kRtol = 1e-9;
 
@@ -328,5 +322,4 @@ TEST_P(Driven, CardansJointHasItsLaw) {
 
 INSTANTIATE_TEST_SUITE_P(Methods, Driven, testing::ValuesIn(RankRevealingMethods()), NameOfParam());
 
-}  // namespace driven_test
-}  // namespace loopbench::harness::reference
+}  // namespace loopbench::harness::reference::driven_test

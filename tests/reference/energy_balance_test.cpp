@@ -1,19 +1,11 @@
 // The energy balance of problems that are not conservative: work supplied and dissipated against
 // closed forms, and a balance that closes to the integrator's tolerance.
-#include <gtest/gtest.h>
-
-#include <cmath>
-#include <string>
-#include <tuple>
-#include <utility>
-
 #include "harness/integrator/arkode.h"
 #include "mechanism/description/library.h"
 #include "mechanism/start/assembly.h"
 #include "tests/reference/cases.h"
 
-namespace loopbench::harness::reference {
-namespace energy_balance_test {
+namespace loopbench::harness::reference::energy_balance_test {
 
 constexpr double kTolerance = 1e-10;
 constexpr double kHorizon = 5.0;  // [s]
@@ -186,5 +178,4 @@ TEST(Balance, IntegratingWorkLeavesTheBitsOfTheMotion) {
   EXPECT_EQ(ends[0], ends[1]);
 }
 
-}  // namespace energy_balance_test
-}  // namespace loopbench::harness::reference
+}  // namespace loopbench::harness::reference::energy_balance_test

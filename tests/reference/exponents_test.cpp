@@ -1,13 +1,8 @@
 // How drift grows, and what it follows: the formulation, the level, the coordinates or the
 // geometry.
-#include <gtest/gtest.h>
-
-#include <cmath>
-
 #include "tests/reference/cases.h"
 
-namespace loopbench::harness::reference {
-namespace exponents_test {
+namespace loopbench::harness::reference::exponents_test {
 
 /// Eight perturbed starts of the four-bar (ground 1.5 m), whose closure is no linear invariant.
 Record GeneralFourBar(const std::string& formulation) {
@@ -71,5 +66,4 @@ TEST(DriftOfTheSquareSevenBar, FollowsTheToleranceInAbsoluteCoordinates) {
   }
 }
 
-}  // namespace exponents_test
-}  // namespace loopbench::harness::reference
+}  // namespace loopbench::harness::reference::exponents_test

@@ -1,16 +1,10 @@
 // The stiff flyball governor of benchmark A05: loops closed by spring-dampers whose modes decay in
 // 1e-4 s, against numbers of two stiff integrators on a reduction to three coordinates.
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <cmath>
-
 #include "tests/reference/cases.h"
 #include "tests/reference/published_numbers.h"
 #include "tests/reference/simulate.h"
 
-namespace loopbench::harness::reference {
-namespace flyball_test {
+namespace loopbench::harness::reference::flyball_test {
 
 const MechanismDescription& Governor() {
   static const MechanismDescription kGovernor =
@@ -58,5 +52,4 @@ TEST_P(Flyball, ImplicitMethodNeedsAFiftiethOfTheSteps) {
 INSTANTIATE_TEST_SUITE_P(Methods, Flyball, testing::ValuesIn(RankRevealingMethods()),
                          NameOfParam());
 
-}  // namespace flyball_test
-}  // namespace loopbench::harness::reference
+}  // namespace loopbench::harness::reference::flyball_test

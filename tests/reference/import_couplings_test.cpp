@@ -1,16 +1,9 @@
 // Joints of SDF that follow others, over runs, against closed forms: gears, a rack, a screw.
-#include <gtest/gtest.h>
-
-#include <cmath>
-#include <iostream>
-#include <numbers>
-
 #include "harness/exchange/import.h"
 #include "tests/reference/cases.h"
 #include "tests/reference/simulate.h"
 
-namespace loopbench::harness::reference {
-namespace import_couplings_test {
+namespace loopbench::harness::reference::import_couplings_test {
 
 constexpr double kTolerance = 1e-10, kHorizon = 2.0, kGravity = 9.8;
 constexpr double kMass = 2.0, kInertia = 1.0;
@@ -75,16 +68,15 @@ TEST(ImportCouplings, ARackFallsWithThePinionThatItTurns) {
   RunAll(rack, [&](const Snapshot& last) {
     const double v = -kMass * kGravity / (kMass + kInertia / 0.25) * kHorizon;
     const Eigen::Matrix3d& R = last.bodies[p].R;
-    const double open =
-        std::remainder(2.0 * (last.bodies[r].p.z() - 0.3) + 0.2 - std::atan2(R(1, 0), R(0, 0)),
-                       2.0 * std::numbers::pi);
+    const double open = std::remainder(
+        2.0 * (last.bodies[r].p.z() - 0.3) + 0.2 - std::atan2(R(1, 0), R(0, 0)), 2.0 * kPi);
     return std::max({std::abs(last.bodies[r].v.z() - v), std::abs(last.bodies[p].w.z() - 2.0 * v),
                      std::abs(open)});
   });
 }
 
 TEST(ImportCouplings, ScrewsSlideByTheirLeadPerTurn) {
-  constexpr double kLead = 0.5, kPerAngle = kLead / (2.0 * std::numbers::pi);
+  constexpr double kLead = 0.5, kPerAngle = kLead / (2.0 * kPi);
   // right-handed; rad/m are positive for a left-handed thread
   for (const char* pitch : {"<screw_thread_pitch>0.5</screw_thread_pitch>",
                             "<thread_pitch>-12.566370614359172</thread_pitch>"}) {
@@ -97,10 +89,9 @@ TEST(ImportCouplings, ScrewsSlideByTheirLeadPerTurn) {
           {std::abs(body.v.z() - v), std::abs(body.w.z() - v / kPerAngle),
            std::abs(body.p.z() - 0.5 * v * kHorizon),
            std::abs(std::remainder(body.p.z() / kPerAngle - std::atan2(body.R(1, 0), body.R(0, 0)),
-                                   2.0 * std::numbers::pi))});
+                                   2.0 * kPi))});
     });
   }
 }
 
-}  // namespace import_couplings_test
-}  // namespace loopbench::harness::reference
+}  // namespace loopbench::harness::reference::import_couplings_test

@@ -1,25 +1,14 @@
 // Mechanisms of other formats (configs/imports/), written from published parameters: the motion of
 // each against numbers that do not come from this library: closed forms, published or derived
 // numbers, an integration of published equations, or a shipped mechanism that has such a reference.
-#include <gtest/gtest.h>
-
-#include <array>
-#include <cmath>
-#include <functional>
-#include <iostream>
-#include <numbers>
-
-#include "harness/base/text.h"
 #include "harness/exchange/import.h"
 #include "harness/observers/observer.h"
 #include "tests/reference/cases.h"
 #include "tests/reference/published_numbers.h"
 #include "tests/reference/simulate.h"
 
-namespace loopbench::harness::reference {
-namespace imports_test {
+namespace loopbench::harness::reference::imports_test {
 
-constexpr double kPi = std::numbers::pi;
 constexpr double kTolerance = 1e-11;  // rtol = atol unless a test says otherwise
 
 MechanismDescription Import(const std::string& file, const std::string& sidecar = "",
@@ -28,10 +17,6 @@ MechanismDescription Import(const std::string& file, const std::string& sidecar 
   options.planar = planar;
   if (!sidecar.empty()) options.sidecar = kConfigs / "imports" / sidecar;
   return ImportMechanism(kConfigs / "imports" / file, options).description;
-}
-
-MechanismDescription Shipped(const std::string& name) {
-  return ReadMechanism(kConfigs / "mechanisms" / (name + ".json")).description;
 }
 
 Simulation RunTo(const MechanismDescription& description, const Method& method, double horizon,
@@ -150,7 +135,7 @@ TEST_P(Imports, CartPoleOfMjcfFollowsTheEquationsOf1983) {
 
 /// The published angles are of the crank; its speed follows, in the plane and in space.
 TEST_P(Imports, AndrewsSqueezerOfMjcfIsThatOfA03) {
-  const MechanismDescription shipped = Shipped("andrews-squeezer");
+  const MechanismDescription shipped = Shipped("andrews-squeezer").description;
   const Simulation ours = RunTo(shipped, GetParam(), 0.03);
   for (const bool planar : {false, true}) {
     // nine redundant constraints: dense ones of absolute coordinates take fifteen seconds
@@ -224,7 +209,7 @@ TEST_P(Imports, LoopsWithinUrdfMoveAsInASidecar) {
 }
 
 TEST_P(Imports, BennettOfUrdfMovesAsTheShippedOne) {
-  const MechanismDescription shipped = Shipped("bennett");
+  const MechanismDescription shipped = Shipped("bennett").description;
   const MechanismDescription linkage = Import("bennett.urdf", "bennett-loop.json", false);
   const Simulation ours = RunTo(shipped, GetParam(), 2.0);
   const Simulation run = RunTo(linkage, GetParam(), 2.0);
@@ -293,5 +278,4 @@ TEST_P(Imports, FurutaPendulumOfSdfFollowsItsEquations) {
 INSTANTIATE_TEST_SUITE_P(Methods, Imports, testing::ValuesIn(RankRevealingMethods()),
                          NameOfParam());
 
-}  // namespace imports_test
-}  // namespace loopbench::harness::reference
+}  // namespace loopbench::harness::reference::imports_test

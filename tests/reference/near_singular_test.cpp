@@ -2,19 +2,11 @@
 // begins to bend the motion. Ends by other means: parametrisations without singular configurations,
 // a differential equation of one angle, quadrature of dt = dq / qdot in 28 digits, an integration
 // in absolute coordinates at 1e-12.
-#include <gtest/gtest.h>
-
-#include <cmath>
-#include <limits>
-#include <map>
-#include <numbers>
-
 #include "harness/judge/analysis.h"
 #include "tests/reference/cases.h"
 #include "tests/reference/simulate.h"
 
-namespace loopbench::harness::reference {
-namespace near_singular_test {
+namespace loopbench::harness::reference::near_singular_test {
 
 /// Angles [rad] or origins [m] of bodies at the end, and their accuracy.
 struct KnownEnd {
@@ -73,7 +65,7 @@ double ErrorOf(const KnownEnd& known, const Method& method, double tolerance) {
   double worst = 0.0;
   for (const auto& [body, angle] : known.angles) {
     const double miss = AngleOf(run.last.bodies[BodyNamed(d, body)]) - angle;
-    worst = std::max(worst, std::abs(std::remainder(miss, 2 * std::numbers::pi)));
+    worst = std::max(worst, std::abs(std::remainder(miss, 2 * kPi)));
   }
   for (const auto& [body, origin] : known.origins) {
     const Eigen::Vector3d p = PointOf(d, run.last, BodyNamed(d, body), Eigen::Vector3d::Zero());
@@ -117,5 +109,4 @@ TEST_P(NearSingular, WrongOnesAreFlaggedAlone) {
 INSTANTIATE_TEST_SUITE_P(Methods, NearSingular, testing::ValuesIn(PositionMethods()),
                          NameOfParam());
 
-}  // namespace near_singular_test
-}  // namespace loopbench::harness::reference
+}  // namespace loopbench::harness::reference::near_singular_test

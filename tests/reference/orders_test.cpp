@@ -1,22 +1,12 @@
 // The order of every profile on whole mechanisms: for each formulation at each level, with steps of
 // fixed length. A projection after a step, a projection in its stages or a feedback may cost no
 // order; nor may a formulation.
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <cmath>
-#include <map>
-#include <string>
-#include <tuple>
-#include <vector>
-
 #include "harness/config/formulations.h"
 #include "harness/config/options.h"
 #include "tests/reference/cases.h"
 #include "tests/reference/simulate.h"
 
-namespace loopbench::harness::reference {
-namespace orders_test {
+namespace loopbench::harness::reference::orders_test {
 
 struct Profiled {
   std::string name;
@@ -188,5 +178,4 @@ TEST(OrdersOfProfiles, LackNone) {
   EXPECT_EQ(names, ProfileNames());
 }
 
-}  // namespace orders_test
-}  // namespace loopbench::harness::reference
+}  // namespace loopbench::harness::reference::orders_test

@@ -1,17 +1,10 @@
 // Loops with constraints that are redundant at every position: their drift grows as that of any
 // other mechanism, by the level and not by the redundancy.
-#include <gtest/gtest.h>
-
-#include <Eigen/Geometry>
-#include <cmath>
-#include <vector>
-
 #include "harness/judge/analysis.h"
 #include "mechanism/description/joint_frames.h"
 #include "tests/reference/cases.h"
 
-namespace loopbench::harness::reference {
-namespace overconstrained_test {
+namespace loopbench::harness::reference::overconstrained_test {
 
 Experiment InSpace(const MechanismFile& mechanism) {
   Experiment experiment = Single(mechanism);
@@ -287,5 +280,4 @@ TEST_P(Linkage, FollowsAnIndependentIntegrationInEveryColumn) {
 
 INSTANTIATE_TEST_SUITE_P(All, Linkage, ::testing::ValuesIn(LinkageNames()), NameOfParam());
 
-}  // namespace overconstrained_test
-}  // namespace loopbench::harness::reference
+}  // namespace loopbench::harness::reference::overconstrained_test

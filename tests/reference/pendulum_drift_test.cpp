@@ -1,16 +1,10 @@
 // The pendulum of SUNDIALS cvPendulum_dns in Cartesian coordinates after fifteen periods of 2 s:
 // its published table of errors beside ours, rows of docs/published-problems.md.
-#include <gtest/gtest.h>
-
-#include <cmath>
-#include <iostream>
-
 #include "tests/reference/cases.h"
 #include "tests/reference/published_numbers.h"
 #include "tests/reference/simulate.h"
 
-namespace loopbench::harness::reference {
-namespace pendulum_drift_test {
+namespace loopbench::harness::reference::pendulum_drift_test {
 
 /// Errors at 30 s, where the exact state is the first one: (1, 0) at rest.
 PendulumErrors RodPendulum(const Method& method, double rtol) {
@@ -66,5 +60,4 @@ std::vector<Method> BothLevels() {
 
 INSTANTIATE_TEST_SUITE_P(Methods, PendulumDrift, testing::ValuesIn(BothLevels()), NameOfParam());
 
-}  // namespace pendulum_drift_test
-}  // namespace loopbench::harness::reference
+}  // namespace loopbench::harness::reference::pendulum_drift_test

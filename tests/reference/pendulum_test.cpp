@@ -1,20 +1,9 @@
 // PendulumAngle (elliptic functions) against an integration of theta'' = -w^2 sin(theta) that
 // shares nothing with it.
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <cmath>
-#include <limits>
-#include <numbers>
-#include <vector>
-
 #include "harness/observers/observer.h"
+#include "tests/standard.h"
 
-namespace loopbench::harness::reference {
-namespace pendulum_test {
-
-constexpr double kEps = std::numeric_limits<double>::epsilon();
-constexpr double kPi = std::numbers::pi;
+namespace loopbench::harness::reference::pendulum_test {
 
 struct Start {
   double frequency_squared, theta, omega;
@@ -175,5 +164,4 @@ TEST(PendulumAngle, HalvesOfATurnedMotionMirrorEachOther) {
   }
 }
 
-}  // namespace pendulum_test
-}  // namespace loopbench::harness::reference
+}  // namespace loopbench::harness::reference::pendulum_test

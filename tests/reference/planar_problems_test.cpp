@@ -1,10 +1,5 @@
 // Published planar problems as shipped, in their plane and turned by any rotation into space, where
 // loops of parallel axes carry three redundant constraints each: the same numbers.
-#include <gtest/gtest.h>
-
-#include <cmath>
-#include <numbers>
-
 #include "harness/observers/observer.h"
 #include "mechanism/description/library.h"
 #include "mechanism/description/transforms.h"
@@ -12,10 +7,8 @@
 #include "tests/reference/published_numbers.h"
 #include "tests/reference/simulate.h"
 
-namespace loopbench::harness::reference {
-namespace planar_problems_test {
+namespace loopbench::harness::reference::planar_problems_test {
 
-constexpr double kPi = std::numbers::pi;
 constexpr double kTolerance = 1e-11;  // rtol = atol unless a test says otherwise
 
 enum class Place { kPlane, kTilted };
@@ -220,5 +213,4 @@ INSTANTIATE_TEST_SUITE_P(Methods, PlanarProblem,
                                   (std::get<1>(test.param) == Place::kPlane ? "Plane" : "Tilted");
                          });
 
-}  // namespace planar_problems_test
-}  // namespace loopbench::harness::reference
+}  // namespace loopbench::harness::reference::planar_problems_test

@@ -1,14 +1,9 @@
 // Level projection: loops that stay closed, orders that survive. singular_test.cpp takes it through
 // singular positions.
-#include <gtest/gtest.h>
-
-#include <cmath>
-
 #include "tests/reference/cases.h"
 #include "tests/reference/simulate.h"
 
-namespace loopbench::harness::reference {
-namespace projection_test {
+namespace loopbench::harness::reference::projection_test {
 
 /// Fixed steps against a run with tiny ones.
 void ExpectOrders(const Method& method) {
@@ -87,5 +82,4 @@ TEST_P(BaumgarteRun, FollowsPrescribedMotions) {
 INSTANTIATE_TEST_SUITE_P(Methods, BaumgarteRun,
                          testing::ValuesIn(MethodsAt({Enforcement::kBaumgarte})), NameOfParam());
 
-}  // namespace projection_test
-}  // namespace loopbench::harness::reference
+}  // namespace loopbench::harness::reference::projection_test

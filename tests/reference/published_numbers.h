@@ -6,8 +6,7 @@
 // digits.
 #pragma once
 
-#include <array>
-#include <cmath>
+#include "tests/standard.h"
 
 namespace loopbench::harness::reference {
 

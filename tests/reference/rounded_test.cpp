@@ -1,21 +1,13 @@
 // Files with few digits: loops close within their accuracy, and what differs by less is redundant.
-#include <gtest/gtest.h>
-
-#include <cmath>
-#include <filesystem>
-#include <limits>
-#include <numbers>
-
 #include "mechanism/simplify/redundancy.h"
 #include "mechanism/simplify/structure.h"
 #include "mechanism/start/assembly.h"
 #include "tests/reference/cases.h"
 #include "tests/reference/simulate.h"
 
-namespace loopbench::harness::reference {
-namespace rounded_test {
+namespace loopbench::harness::reference::rounded_test {
 
-constexpr double kQuarter = std::numbers::pi / 2;
+constexpr double kQuarter = kPi / 2;
 
 MechanismFile Rounded(const std::string& name) {
   return ReadMechanism(kRoot / "tests/reference/rounded" / (name + ".json"));
@@ -213,7 +205,7 @@ TEST(RoundedInput, DrivenLinkagesExchangeNoEnergyPerTurn) {
   std::erase_if(file.description.initial.coordinates,
                 [](const JointValues& values) { return values.joint == 0; });
   for (const Method& method : MethodsAt({Enforcement::kVelocity}, {Coordinates::kJoint})) {
-    const Record record = RunFile(file, method, 1e-8, 2.0 * std::numbers::pi / kSpeed);
+    const Record record = RunFile(file, method, 1e-8, 2.0 * kPi / kSpeed);
     EXPECT_EQ(record.Text("outcome"), "finished") << ToString(method);
     // Speeds miss by the lean of 1e-6 times T^2 times the ratio of joint speeds, here above 100.
     EXPECT_LT(record.Number("energy_error_relative"), 5e-3) << ToString(method);
@@ -238,7 +230,7 @@ TEST(RoundedInput, GivenSpeedsOfALoopFitWithinTheAccuracy) {
     if (unit == 1e-3) continue;
     EXPECT_FALSE(start.has_given_speeds);
     EXPECT_LT((start.u - exact.u).lpNorm<Eigen::Infinity>(), unit);
-    EXPECT_LT(start.speed_residual, 64 * std::numeric_limits<double>::epsilon());
+    EXPECT_LT(start.speed_residual, 64 * kEps);
   }
 }
 
@@ -330,8 +322,7 @@ TEST(RoundedInput, CoarseDrawingsCloseExactly) {
   const VectorX<double> drawn = GuessedPositions(file.description, mechanism);
   EXPECT_GT((start.q - drawn).lpNorm<Eigen::Infinity>(), 0.04) << "too near to test it";
   // Sums of three lengths below 1 m and of three angles.
-  EXPECT_LT(start.position_residual, 16 * std::numeric_limits<double>::epsilon());
+  EXPECT_LT(start.position_residual, 16 * kEps);
 }
 
-}  // namespace rounded_test
-}  // namespace loopbench::harness::reference
+}  // namespace loopbench::harness::reference::rounded_test

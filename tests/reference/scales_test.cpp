@@ -1,20 +1,11 @@
 // Size and mass decide nothing: the same mechanism in other units moves alike and has the same
 // rank.
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <cmath>
-#include <string>
-#include <utility>
-#include <vector>
-
 #include "mechanism/description/transforms.h"
 #include "mechanism/start/assembly.h"
 #include "tests/reference/cases.h"
 #include "tests/reference/simulate.h"
 
-namespace loopbench::harness::reference {
-namespace scales_test {
+namespace loopbench::harness::reference::scales_test {
 
 struct FirstEvaluation {
   Outcome outcome = Outcome::kFinished;
@@ -151,5 +142,4 @@ TEST(InSpace, PlanarLoopsReportThreeRedundantRowsEach) {
   }
 }
 
-}  // namespace scales_test
-}  // namespace loopbench::harness::reference
+}  // namespace loopbench::harness::reference::scales_test

@@ -1,14 +1,8 @@
 // Energy: every shipped mechanism with all three formulations and both coordinate sets for a short
 // while, and the paper's conservative problems that stay clear of singular positions.
-#include <gtest/gtest.h>
-
-#include <string>
-#include <tuple>
-
 #include "tests/reference/cases.h"
 
-namespace loopbench::harness::reference {
-namespace shipped_mechanisms_test {
+namespace loopbench::harness::reference::shipped_mechanisms_test {
 
 /// Time of a short run [s]: Andrews' squeezer turns a thousand times as fast as the others, the
 /// governor takes 1e4 steps a second.
@@ -62,5 +56,4 @@ INSTANTIATE_TEST_SUITE_P(Paper, ConservativeProblem,
                                           testing::ValuesIn(PublishedMethods())),
                          NameOfParam());
 
-}  // namespace shipped_mechanisms_test
-}  // namespace loopbench::harness::reference
+}  // namespace loopbench::harness::reference::shipped_mechanisms_test

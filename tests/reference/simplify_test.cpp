@@ -1,12 +1,6 @@
 // Models of a problem against the whole mechanism, point by point. Exact models agree up to errors
 // of the integrator. The error of approximate models vanishes with the neglected quantity, and is
 // large if that quantity is large.
-#include <gtest/gtest.h>
-
-#include <cmath>
-#include <string>
-#include <vector>
-
 #include "harness/config/mechanism_reader.h"
 #include "harness/run/run.h"
 #include "mechanism/simplify/model.h"
@@ -14,8 +8,7 @@
 #include "tests/harness/places.h"
 #include "tests/reference/simulate.h"
 
-namespace loopbench::harness::reference {
-namespace simplify_test {
+namespace loopbench::harness::reference::simplify_test {
 
 MechanismDescription Problem(const std::string& path) {
   return ReadMechanism(kConfigs / (path + ".json")).description;
@@ -272,5 +265,4 @@ TEST(SimplifiedModels, CombinedOnesHaveTheErrorOfTheirWorst) {
   EXPECT_GT(difference.largest, kSameMotion);
 }
 
-}  // namespace simplify_test
-}  // namespace loopbench::harness::reference
+}  // namespace loopbench::harness::reference::simplify_test

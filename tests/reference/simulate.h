@@ -2,13 +2,9 @@
 // compare poses and speeds, not the columns of tables.
 #pragma once
 
-#include <cmath>
-#include <functional>
-#include <string>
-#include <vector>
-
 #include "harness/config/experiment.h"
 #include "harness/integrator/arkode.h"
+#include "tests/standard.h"
 
 namespace loopbench::harness::reference {
 

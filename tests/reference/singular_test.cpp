@@ -1,18 +1,7 @@
 // Through singular positions at level projection, which no level below does at every tolerance, and
 // at level velocity.
 // configs/experiments/extremes/ runs the same at full size; here are the smaller members.
-#include <fmt/format.h>
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <cmath>
-#include <limits>
-#include <numbers>
-#include <tuple>
-#include <vector>
-
 #include "harness/config/formulations.h"
-#include "harness/run/run.h"
 #include "mechanism/description/library.h"
 #include "mechanism/description/transforms.h"
 #include "tests/harness/integrator_problems.h"
@@ -20,8 +9,7 @@
 #include "tests/reference/published_numbers.h"
 #include "tests/reference/simulate.h"
 
-namespace loopbench::harness::reference {
-namespace singular_test {
+namespace loopbench::harness::reference::singular_test {
 
 const Method kOdcaPosition{.enforcement = Enforcement::kPosition};
 
@@ -172,11 +160,11 @@ class Ladders : public testing::TestWithParam<int> {};
 /// Benchmark A02 by its closed form; a threshold that chatters would show as rejected steps.
 TEST_P(Ladders, TwentySecondsThroughAllSingularInstants) {
   MechanismFile file;
-  file.description = Ladder(GetParam(), std::numbers::pi / 2, -1.0);
+  file.description = Ladder(GetParam(), kPi / 2, -1.0);
   // n couplers translate, n + 1 cranks turn: one pendulum (reference problem A02)
   const double n = GetParam();
   file.observe.closed_form =
-      PendulumForm{"crank0", -std::numbers::pi / 2, ((n + 1) / 2 + n) * 9.81 / ((n + 1) / 3 + n)};
+      PendulumForm{"crank0", -kPi / 2, ((n + 1) / 2 + n) * 9.81 / ((n + 1) / 3 + n)};
   const Experiment experiment = Single(file);
   for (const double tolerance : {1e-8, 1e-9}) {
     const Record record = RunCase(
@@ -191,7 +179,7 @@ INSTANTIATE_TEST_SUITE_P(Windows, Ladders, testing::Values(1, 2, 10),
                          [](const auto& test) { return std::to_string(test.param); });
 
 TEST(LadderOfForty, EndsWhereThePublishedOneDoes) {
-  const MechanismDescription ladder = Ladder(40, std::numbers::pi / 2, -1.0);
+  const MechanismDescription ladder = Ladder(40, kPi / 2, -1.0);
   const PathPoint& end = kA02PublishedN40At20Seconds;
   const Simulation run = Simulate(ladder, kOdcaPosition, Options("ode45", 1e-8), end.t);
   ASSERT_EQ(run.result.outcome, Outcome::kFinished) << run.result.message;
@@ -287,7 +275,7 @@ TEST(RegularizedPositions, HaveTheAccelerationsOfTheirBranch) {
       }
       return values;
     };
-    const double pi = std::numbers::pi;
+    const double pi = kPi;
     const std::vector<double> hanging = {-pi / 2, 0.0, pi, 0.0, -pi}, none(5, 0.0);
     ExpectAccelerations(
         description, mechanism, added, [&](double angle) { return by_joint(hanging, angle); },
@@ -310,9 +298,9 @@ TEST(RegularizedPositions, HaveTheAccelerationsOfTheirBranchInSpace) {
     const Mechanism<Spatial, double> mechanism(description, Coordinates::kJoint);
     const auto& joints = mechanism.joints();
     const auto positions = [&](double angle) {
-      const double half = (std::numbers::pi / 2 + angle) / 2;  // of the third bar
+      const double half = (kPi / 2 + angle) / 2;  // of the third bar
       VectorX<double> q = VectorX<double>::Zero(mechanism.num_q());
-      q[joints[0].q_offset] = -std::numbers::pi / 2 + angle;
+      q[joints[0].q_offset] = -kPi / 2 + angle;
       q[joints[1].q_offset] = -angle;
       q[joints[3].q_offset] = std::cos(half);
       q[joints[3].q_offset + 3] = std::sin(half);
@@ -333,7 +321,7 @@ TEST(RegularizedPositions, HaveTheAccelerationsOfTheirBranchInSpace) {
 
 /// Where the tip of the first crank is at the end: infinitely far if a step met a position in line.
 Eigen::Vector3d Tip(int windows, const Method& method, double rtol, double horizon) {
-  const MechanismDescription ladder = Ladder(windows, std::numbers::pi / 2, -1.0);
+  const MechanismDescription ladder = Ladder(windows, kPi / 2, -1.0);
   const Simulation run = Simulate(ladder, method, Options("ode45", rtol), horizon);
   if (run.result.outcome == Outcome::kSingular) {
     return Eigen::Vector3d::Constant(std::numeric_limits<double>::infinity());
@@ -384,5 +372,4 @@ TEST(LongPassages, TwentyOfTheNFourBarOfFortyByOdca) {
   EXPECT_NEAR(tip.y(), end.y, 4.1e-6 + 7e-6);
 }
 
-}  // namespace singular_test
-}  // namespace loopbench::harness::reference
+}  // namespace loopbench::harness::reference::singular_test

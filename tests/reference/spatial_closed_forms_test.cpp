@@ -1,20 +1,12 @@
 // One rigid body in space against elliptic functions: free, on a spherical joint, and on one that
 // closes a loop with a free joint, so that every formulation has constraints in both coordinate
 // sets.
-#include <gtest/gtest.h>
-
-#include <Eigen/Geometry>
-#include <cmath>
-#include <numbers>
-
 #include "tests/reference/cases.h"
 #include "tests/reference/rigid_motions.h"
 #include "tests/reference/simulate.h"
 
-namespace loopbench::harness::reference {
-namespace spatial_closed_forms_test {
+namespace loopbench::harness::reference::spatial_closed_forms_test {
 
-constexpr double kPi = std::numbers::pi;
 constexpr double kTolerance = 1e-11;  // rtol = atol of every run here
 constexpr double kHorizon = 4.0;      // several turns of every motion [s]
 
@@ -251,5 +243,4 @@ TEST(FreeBody, KeepsItsMomentumAndEnergy) {
   }
 }
 
-}  // namespace spatial_closed_forms_test
-}  // namespace loopbench::harness::reference
+}  // namespace loopbench::harness::reference::spatial_closed_forms_test

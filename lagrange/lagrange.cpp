@@ -25,10 +25,7 @@ bool IsLessWork(const JointResponse<Space>& sparse, const Mechanism<Space, doubl
 template <class Space, class S>
 Lagrange<Space, S>::Lagrange(const Mechanism<Space, S>& mechanism,
                              const FormulationOptions& options)
-    : mechanism_(mechanism),
-      equations_(mechanism),
-      change_(VectorX<S>::Zero(mechanism.num_u())),
-      lambda_change_(VectorX<S>::Zero(mechanism.num_rows())) {
+    : mechanism_(mechanism), equations_(mechanism), change_(VectorX<S>::Zero(mechanism.num_u())) {
   if constexpr (std::is_same_v<S, double>) {
     if (options.solver == SolverKind::kRankRevealing && !options.general) {
       joints_ = JointResponse<Space>::Make(mechanism, kMaxOfResponse);
@@ -116,17 +113,9 @@ bool Lagrange<Space, S>::AccelerateWithShare(const Kinematics<Space, S>& kinemat
                                              VectorX<S>* lambda) {
   if constexpr (std::is_same_v<S, double>) {
     if (!is_sparse_) return false;
-    equations_.SetState(kinematics, feedback);
-    SolveEquations();
-    if (lambda != nullptr) equations_.Read(joints_->phi(), *lambda);
-    equations_.SetMore(stress.ShareOfAccelerations(kinematics, equations_.A()));
-    SolveEquations();
-    equations_.AddLast();
-    equations_.Read(kinematics, udot);
-    if (lambda == nullptr) return true;
-    lambda_change_ = *lambda;
-    equations_.Read(joints_->phi(), *lambda);
-    *lambda += lambda_change_;
+    equations_.AccelerateWithShare(
+        kinematics, feedback, stress, udot, lambda, [&] { SolveEquations(); },
+        [&] { return joints_->phi(); });
     return true;
   }
   return false;

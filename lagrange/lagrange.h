@@ -47,7 +47,7 @@ class Lagrange final : public ConstraintSolver<Space, S> {
   BodyEquations<Space, S> equations_;
   const Kinematics<Space, S>* kinematics_ = nullptr;  ///< of the last Factor()
   bool is_sparse_ = false;
-  VectorX<S> change_, lambda_change_;
+  VectorX<S> change_;
 };
 
 }  // namespace loopbench::lagrange

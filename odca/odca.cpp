@@ -39,8 +39,7 @@ Odca<Space, S>::Odca(const Mechanism<Space, S>& mechanism, const FormulationOpti
       plan_(MakePlan(mechanism, plan.value_or(PlanOptionsOf(options.solver)))),
       sweep_(mechanism, plan_, options.solver, options.threads),
       equations_(mechanism),
-      change_(VectorX<S>::Zero(mechanism.num_u())),
-      lambda_change_(VectorX<S>::Zero(mechanism.num_rows())) {
+      change_(VectorX<S>::Zero(mechanism.num_u())) {
   if (options.solver != SolverKind::kRankRevealing || options.general) return;
   if constexpr (!std::is_same_v<S, double>) {
     return;
@@ -108,17 +107,9 @@ template <class Space, class S>
 bool Odca<Space, S>::AccelerateWithShare(const Kinematics<Space, S>& kinematics,
                                          const VectorX<S>& feedback, SelfStress<Space, S>& stress,
                                          VectorX<S>& udot, VectorX<S>* lambda) {
-  equations_.SetState(kinematics, feedback);
-  SolveEquations();
-  if (lambda != nullptr) equations_.Read(sweep_.multipliers(), *lambda);
-  equations_.SetMore(stress.ShareOfAccelerations(kinematics, equations_.A()));
-  SolveEquations();
-  equations_.AddLast();
-  equations_.Read(kinematics, udot);
-  if (lambda == nullptr) return true;
-  lambda_change_ = *lambda;
-  equations_.Read(sweep_.multipliers(), *lambda);
-  *lambda += lambda_change_;
+  equations_.AccelerateWithShare(
+      kinematics, feedback, stress, udot, lambda, [&] { SolveEquations(); },
+      [&] { return sweep_.multipliers(); });
   return true;
 }
 

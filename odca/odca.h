@@ -73,7 +73,7 @@ class Odca final : public ConstraintSolver<Space, S> {
   bool by_short_cut_ = false;                         ///< the last evaluation was
   const Kinematics<Space, S>* kinematics_ = nullptr;  ///< of the last Factor()
   BodyEquations<Space, S> equations_;
-  VectorX<S> change_, lambda_change_;
+  VectorX<S> change_;
 };
 
 }  // namespace loopbench::odca

@@ -74,7 +74,7 @@ inline double DenseWork(double n, double r) {
   return n * (120.0 + 0.7 * n + r) + 0.1 * r * r * (r / 3.0 + f) + 0.06 * n * f * (n + f);
 }
 
-/// The same for sparse factors: elimination takes `operations` and leaves `fill` entries in L.
+/// Work of sparse factors: elimination takes `operations` and leaves `fill` entries in L.
 template <class Space>
 double SparseWork(double entries, double operations, double fill, double bodies, double f) {
   const double dim = Space::kDim;

@@ -15,6 +15,7 @@ BodyEquations<Space, S>::BodyEquations(const Mechanism<Space, S>& mechanism)
       last_(b_),
       c0_(mechanism.joints().size(), Components<Space, S>::Zero()),
       known_(mechanism.joints().size(), Acceleration<Space, S>::Zero()),
+      lambda_change_(VectorX<S>::Zero(mechanism.num_rows())),
       known_x_(VectorX<S>::Zero(mechanism.num_u())) {}
 
 /// b = M^-1 times the wrench, at the centre of mass in ground axes: the part of the paper's zeta_i3
@@ -48,17 +49,6 @@ void BodyEquations<Space, S>::SetTarget(const VectorX<S>& target) {
     const Joint<Space, S>& joint = mechanism_.joints()[index];
     for (int k = 0; k < joint.num_constraints(); ++k) c0_[index][k] = -target[joint.row + k];
   }
-}
-
-template <class Space, class S>
-void BodyEquations<Space, S>::SetMore(const VectorX<S>& target) {
-  std::swap(A_, last_);
-  SetTarget(target);
-}
-
-template <class Space, class S>
-void BodyEquations<Space, S>::AddLast() {
-  for (std::size_t body = 0; body < A_.size(); ++body) A_[body] += last_[body];
 }
 
 template <class Space, class S>

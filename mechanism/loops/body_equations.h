@@ -13,6 +13,7 @@
 #pragma once
 
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "mechanism/model/kinematics.h"
@@ -32,10 +33,24 @@ class BodyEquations {
   void SetWrenches(const Kinematics<Space, S>& kinematics, const VectorX<S>& wrenches);
   /// For ConstraintSolver::Accelerate(): b from the wrenches of applied forces less w x I w.
   void SetState(const Kinematics<Space, S>& kinematics, const VectorX<S>& feedback);
-  /// Sets accelerations of constraints as the only load, for a solution to be added to the last
-  /// one: then AddLast().
-  void SetMore(const VectorX<S>& target);
-  void AddLast();
+  /// ConstraintSolver::AccelerateWithShare(): `solve` solves the equations as they are set, `phi`
+  /// returns the constraint forces of the last solution.
+  void AccelerateWithShare(const Kinematics<Space, S>& kinematics, const VectorX<S>& feedback,
+                           auto& stress, VectorX<S>& udot, VectorX<S>* lambda, auto solve,
+                           auto phi) {
+    SetState(kinematics, feedback);
+    solve();
+    if (lambda != nullptr) Read(phi(), *lambda);
+    SetTarget(stress.ShareOfAccelerations(kinematics, A_));
+    std::swap(A_, last_);
+    solve();
+    for (std::size_t body = 0; body < A_.size(); ++body) A_[body] += last_[body];
+    Read(kinematics, udot);
+    if (lambda == nullptr) return;
+    lambda_change_ = *lambda;
+    Read(phi(), *lambda);
+    *lambda += lambda_change_;
+  }
   /// Sets the velocity violation of `kinematics` as the only load.
   void SetMissed(const Kinematics<Space, S>& kinematics);
 
@@ -72,6 +87,7 @@ class BodyEquations {
   std::vector<Components<Space, S>> c0_;
   std::vector<Acceleration<Space, S>> known_;
   bool has_force_ = false, has_speeds_ = false;
+  VectorX<S> lambda_change_;
   VectorX<S> known_x_;  ///< part of x that does not come from A
 };
 

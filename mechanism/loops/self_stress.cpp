@@ -490,8 +490,8 @@ void SelfStress<Space, S>::SetWrench(const Loop& loop, const T* z, Wrench<Space,
   }
 }
 
-/// A joint of the forest transmits the wrenches of all loops outward of it: those of loops that do
-/// not pass it cancel.
+/// A joint of the forest transmits the wrenches of all loops that pass its outward side. The two
+/// wrenches of a loop that does not pass the joint cancel.
 template <class Space, class S>
 template <class T>
 void SelfStress<Space, S>::SetForest(const Kinematics<Space, S>& kinematics, T* z,

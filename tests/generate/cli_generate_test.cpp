@@ -590,9 +590,10 @@ std::map<std::string, std::string> RowsByKey(const std::string& csv) {
   return rows;
 }
 
-/// The gate without a clock. `loopbench count` writes the file anew (results/methods/README.md).
-/// Rows that are not exact, where rounding decides an iteration or a pivot, are not compared. The
-/// table is of the portable build; in others a few rows may not be exact.
+/// A gate of exact counts, without times. `loopbench count` renews the file
+/// (results/methods/README.md). Rows that are not exact, where rounding decides an iteration or a
+/// pivot, are not compared. The table is of the portable build; in others a few rows may not be
+/// exact.
 class CountGate : public CountTest, public testing::WithParamInterface<std::string> {};
 
 TEST_P(CountGate, CountsOfAllMechanismsAreThoseOfTheCommittedTable) {

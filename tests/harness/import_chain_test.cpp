@@ -179,7 +179,7 @@ struct BodyMotion {
     v += w.cross(R * way);
     p += R * way;
   }
-  /// Adds the motion of a joint, and goes on to the numbers of the next one.
+  /// Adds the motion of a joint, and advances to the numbers of the next one.
   void Add(const Joint& joint, const double*& q, const double*& u) {
     const Vector3d axis = joint.axis.normalized();
     if (joint.type == "slide") {

@@ -1,4 +1,4 @@
-// Descriptions of other programs as text: what an importer makes of them, and what it says. Texts
+// Descriptions of other programs as text, their imports, and messages of importers. Texts
 // and expected words may have ' in place of ".
 #pragma once
 

@@ -280,7 +280,7 @@ TEST(FixedSteps, ARunTakesThemAll) {
     const Record record = RunCase(experiment, one);
     EXPECT_EQ(record.Text("outcome"), "finished") << record.Text("message");
     EXPECT_EQ(record.Number("t_reached"), one.horizon);
-    // 0.5 / 0.1 and 1 / 0.1 are whole but for rounding
+    // 0.5 / 0.1 and 1 / 0.1 are whole up to rounding
     EXPECT_EQ(record.Number("steps"), std::ceil(one.horizon / one.step - 1e-9));
     EXPECT_EQ(record.Number("rejected"), 0.0) << "there is no error test";
     EXPECT_EQ(record.Number("step"), one.step);
@@ -288,7 +288,7 @@ TEST(FixedSteps, ARunTakesThemAll) {
   }
 }
 
-/// Shorter steps are better by the order: 5 asks for 3^5, a tenth of it is far above chance.
+/// Steps a third as long: order 5 divides the error by 3^5. A tenth of that is far above chance.
 TEST(FixedSteps, ShorterOnesAreMoreAccurate) {
   const Experiment experiment = FourBar(kOdca, R"(, "fixed_steps": [0.06, 0.02])");
   const std::vector<Case> cases = Expand(experiment);

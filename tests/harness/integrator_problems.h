@@ -74,7 +74,7 @@ StepObserver Watch(Look look) {
   };
 }
 
-/// The options by default but for one.
+/// Returns default options with one value replaced.
 template <class Owner, class T>
 IntegratorOptions With(T Owner::*option, std::type_identity_t<T> value) {
   IntegratorOptions options;

@@ -10,28 +10,6 @@ std::vector<std::string> WarningsOf(const MechanismDescription& description) {
   return FindWarnings(description, AnalyseStructure(description));
 }
 
-/// Two planets on the coupler of a parallelogram with cranks of 1 m turn two suns twice as fast.
-/// All joints of the loop are in couplings, so that one of these relates the joint that closes it.
-constexpr const char* kPlanets = R"({{
-  "name": "planets", "space": "planar", "gravity": [0, 0],
-  "bodies": [{{"name": "crank", "mass": 1, "inertia": 0.1, "com": [0.5, 0]}},
-             {{"name": "rod", "mass": 1, "inertia": 0.4, "com": [1, 0]}},
-             {{"name": "rocker", "mass": 1, "inertia": 0.1, "com": [0.5, 0]}},
-             {{"name": "sun", "mass": 1, "inertia": 0.2}}, {{"name": "sun2", "mass": 1, "inertia": 0.2}}],
-  "joints": [
-    {{"name": "O", "type": "revolute", "from": {{"body": "ground"}}, "to": {{"body": "crank"}}}},
-    {{"name": "B", "type": "revolute", "from": {{"body": "crank", "at": [1, 0]}}, "to": {{"body": "rod"}}}},
-    {{"name": "D", "type": "revolute", "from": {{"body": "rod", "at": [2, 0]}},
-      "to": {{"body": "rocker", "at": [1, 0]}}}},
-    {{"name": "C", "type": "revolute", "from": {{"body": "ground", "at": [2, 0]}}, "to": {{"body": "rocker"}}}},
-    {{"name": "S", "type": "revolute", "from": {{"body": "ground"}}, "to": {{"body": "sun"}}}},
-    {{"name": "S2", "type": "revolute", "from": {{"body": "ground", "at": [2, 0]}}, "to": {{"body": "sun2"}}}}],
-  "couplings": [
-    {{"name": "planet", "coefficients": {{"S": 20, "O": -20, "B": 20}}}},
-    {{"name": "planet2", "coefficients": {{"S2": 20, "C": -20, "D": -20}}}}{}],
-  "initial": {{"coordinates": {{"O": 0.7, "B": -0.7, "C": 0.7, "D": 0.7, "S": 1.4, "S2": 1.4}},
-              "fixed": ["O"], "speeds": {{"O": 2.0}}}}}})";
-
 MechanismDescription Scene(const std::string& name) {
   return ReadMechanism(kConfigs / ("mechanisms/" + name + ".json")).description;
 }
@@ -84,7 +62,9 @@ TEST(ModelWarningsTest, SpeedsOfABranchMayStartAtRoundedCoordinates) {
 TEST(ModelWarningsTest, RedundantCouplingsAreNamed) {
   // Watt's sun and planet at both cranks of a parallelogram: the suns turn alike
   const auto planets = [](const std::string& couplings) {
-    return ParseMechanism(fmt::format(kPlanets, couplings), "planets.json").description;
+    std::string text = TestData("planets.json");
+    text.insert(text.find("],\n  \"initial\""), couplings);
+    return ParseMechanism(text, "planets.json").description;
   };
   EXPECT_EQ(WarningsOf(planets("")), std::vector<std::string>{});
   ExpectWarning(planets(R"(, {"name": "suns", "coefficients": {"S": 1, "S2": -1}})"),

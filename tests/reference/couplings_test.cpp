@@ -200,27 +200,9 @@ TEST(Couplings, ThatFollowFromTwoLoopsLetRowsMoveBetweenThem) {
 TEST(Couplings, PlanetsOnAClosedLoopTurnTheirSunsTwiceAsFast) {
   for (const char* extra : {"", R"(, {"name": "again", "coefficients": {"S": 1, "O": -1, "B": 1}})",
                             R"(, {"name": "suns", "coefficients": {"S": 1, "S2": -1}})"}) {
-    const MechanismFile file = ParseMechanism(fmt::format(R"({{
-  "name": "planets", "space": "planar", "gravity": [0, 0],
-  "bodies": [{{"name": "crank", "mass": 1, "inertia": 0.1, "com": [0.5, 0]}},
-             {{"name": "rod", "mass": 1, "inertia": 0.4, "com": [1, 0]}},
-             {{"name": "rocker", "mass": 1, "inertia": 0.1, "com": [0.5, 0]}},
-             {{"name": "sun", "mass": 1, "inertia": 0.2}}, {{"name": "sun2", "mass": 1, "inertia": 0.2}}],
-  "joints": [
-    {{"name": "O", "type": "revolute", "from": {{"body": "ground"}}, "to": {{"body": "crank"}}}},
-    {{"name": "B", "type": "revolute", "from": {{"body": "crank", "at": [1, 0]}}, "to": {{"body": "rod"}}}},
-    {{"name": "D", "type": "revolute", "from": {{"body": "rod", "at": [2, 0]}},
-      "to": {{"body": "rocker", "at": [1, 0]}}}},
-    {{"name": "C", "type": "revolute", "from": {{"body": "ground", "at": [2, 0]}}, "to": {{"body": "rocker"}}}},
-    {{"name": "S", "type": "revolute", "from": {{"body": "ground"}}, "to": {{"body": "sun"}}}},
-    {{"name": "S2", "type": "revolute", "from": {{"body": "ground", "at": [2, 0]}}, "to": {{"body": "sun2"}}}}],
-  "couplings": [
-    {{"name": "planet", "coefficients": {{"S": 20, "O": -20, "B": 20}}}},
-    {{"name": "planet2", "coefficients": {{"S2": 20, "C": -20, "D": -20}}}}{}],
-  "initial": {{"coordinates": {{"O": 0.7, "B": -0.7, "C": 0.7, "D": 0.7, "S": 1.4, "S2": 1.4}},
-              "fixed": ["O"], "speeds": {{"O": 2.0}}}}}})",
-                                                          extra),
-                                              "planets.json");
+    std::string text = TestData("planets.json");
+    text.insert(text.find("],\n  \"initial\""), extra);
+    const MechanismFile file = ParseMechanism(text, "planets.json");
     const double t = 4.0;  // the loop is flat at 1.2 s and 2.8 s
     for (const Method& method : MethodsAt({Enforcement::kVelocity, Enforcement::kPosition})) {
       const Record record = RunFile(file, method, 1e-9, t);
